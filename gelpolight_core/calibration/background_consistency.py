@@ -158,8 +158,9 @@ def _judge_light(
             "%",
             warn=warn,
             remedy=(
-                "Exposure or LEDs changed between background and ball presses, most in"
-                f" {most.file}, which is corrected: let the LEDs warm up, and keep the exposure"
+                f"{what_changed(most.light.corrected)} changed between background and ball presses,"
+                f" most in {most.file}, which is corrected: let the LEDs warm up, and lock all"
+                " settings of the camera"
             ),
         )
     uncorrected = [key for ball in balls for key in ball.light.uncorrected]

@@ -24,12 +24,13 @@ class PressLight:
         the change cannot be corrected.
     largest : float
         Largest change that is corrected, as a share.
-    uncorrected : tuple of str
-        Keys of the changes that remain.
+    corrected, uncorrected : tuple of str
+        Keys of the changes that are corrected, and of those that remain.
     """
 
     gain: LightGain | None = None
     largest: float = 0.0
+    corrected: tuple[str, ...] = ()
     uncorrected: tuple[str, ...] = ()
 
 
@@ -38,13 +39,15 @@ WHAT_CHANGED = {
     "led_off": "The light of one LED",
     "room_light": "Room light",
     "uneven": "The distribution of the light",
+    "rows": "The light from row to row (mains or LEDs that flicker, exposure in mid frame)",
+    "colour_mixing": "The camera's mixing of colours",
 }
-"""Changes of the light that are not corrected, by their keys."""
+"""Changes of the light, by their keys."""
 
 
-def what_changed(uncorrected: Sequence[str]) -> str:
+def what_changed(keys: Sequence[str]) -> str:
     """Return what changed most often, for a message, from the keys of changes."""
-    usual = max(uncorrected, key=uncorrected.count, default="")
+    usual = max(keys, key=keys.count, default="")
     return WHAT_CHANGED.get(usual, "Exposure, LEDs or room light")
 
 

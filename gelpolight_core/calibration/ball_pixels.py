@@ -171,6 +171,11 @@ class BallPixels:
         # Residuals are still those of the camera's values.
         return replace(self, ratio=light, weight=self.weight * seen / (exponent * light))
 
+    def with_contrast(self, contrast: float) -> BallPixels:
+        """Return the pixels of which the camera shows a contrast: the rest is the background."""
+        light = 1.0 + (self.ratio - 1.0) / contrast
+        return replace(self, ratio=light, weight=self.weight * contrast)
+
 
 def gather_ball_pixels(
     press: BallPress,

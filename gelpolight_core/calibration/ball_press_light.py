@@ -97,7 +97,9 @@ def measure_press_light(rgb: Float32Array, check: HealthCheck) -> PressLight:
         lit = before > LEAST_LIGHT
         largest = float(np.abs(rgb[lit] / before[lit] - 1.0).max(initial=0.0))
     uncorrected = tuple(fault.key for fault in health.faults if fault.key in LIGHT)
-    return PressLight(gain, largest, uncorrected)
+    found = [finding.key for finding in health.findings if finding.key in LIGHT]
+    corrected = tuple(key for key in found if gain is not None and key not in uncorrected)
+    return PressLight(gain, largest, corrected, uncorrected)
 
 
 def undo_light_change(rgb: Float32Array, gain: LightGain | None) -> Float32Array:

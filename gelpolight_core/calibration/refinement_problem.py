@@ -22,10 +22,12 @@ from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
-STATED = ("radius", "layers", "square", "led_height", "membrane", "response")
+BLENDED = "contrast"
+STATED = ("radius", "layers", "square", "led_height", "membrane", "response", BLENDED)
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a
-membrane that is flat, and a camera whose values are proportional to light."""
+membrane that is flat, a camera whose values are proportional to light, and one that shows no share
+of an earlier frame."""
 LATERAL = ("layers", "square")
 """Those of them that all lateral lengths are proportional to."""
 RISE_SHARE = 0.1
@@ -131,7 +133,8 @@ class JointProblem:
         ----------
         key, value
             A factor on a stated length, or 1 plus the height of a cap over `RISE_SHARE` of the
-            field's width, or the exponent that makes values proportional to light.
+            field's width, the exponent that makes values proportional to light, or the contrast of
+            the presses against the background.
         """
         presses, board, moved = self.presses, self.board, np.zeros((3, 3))
         leds, bright_mm = self.values(self.start).leds_mm, self.bright_mm
@@ -147,6 +150,8 @@ class JointProblem:
         elif key == "response":
             presses = [p.with_response(value) for p in presses]
             board = board and board.with_response(value)
+        elif key == BLENDED:
+            presses = [p.with_contrast(value) for p in presses]
         elif key == "led_height":
             moved = (value - 1.0) * (leds - np.pad(bright_mm, ((0, 0), (0, 1))))
         else:

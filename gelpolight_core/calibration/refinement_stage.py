@@ -425,6 +425,10 @@ def judge_stated_lengths(
         "led_height": "the LED height ({height:.1f} mm fits)",
         "response": "the camera's response, which is not as declared (an exponent of {x:.2f} fits)",
         "membrane": "the membrane, which is not flat (a cap {cap:.1f} mm high fits)",
+        "contrast": (
+            "temporal noise reduction of the camera: presses have {x:.2f} of their contrast, as if"
+            " it blends in the frame before"
+        ),
         "layers": (
             "thickness and refractive index of the layers ({gel:+.1f} mm of elastomer or"
             " {window:+.1f} mm of window fit)"

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from gelpolight_core.base.arrays import Float64Array
 from .explanations import GAINS, MOST, OFFSETS, PRESSED, explanations
 from .fault_limits import SIGMAS
 from .health_samples import BLUR, RUN, RUNS_OF_CELL, SHIFT_U, SHIFT_V, HealthSamples
-from .robust_fit import CORRELATED, robust_fit
+from .robust_fit import CORRELATED, LEAST_SCALE, robust_fit
 from .row_light import QUARTILE, RowLight, fit_rows
 
 ALIKE = 9.0
@@ -34,6 +35,8 @@ ROWS = "rows"
 """Key of the change by row, whose model is not one of the cells."""
 BLOCK = 4 * RUN
 """Runs of a block of rows."""
+FEW = 0.9
+"""Blocks have changed by a step if a tenth of them have."""
 FINE = (SHIFT_U, SHIFT_V, BLUR)
 SURE = math.log(1000.0)
 """An explanation is taken if the frame is so many times more likely with it."""
@@ -62,16 +65,22 @@ class ChangeFit:
         Of the parameters.
     weight : (cells,)
         1 where a cell follows, 0 where it does not.
+    fine : (cells,)
+        Variance of the texture that is left in each cell, over that of noise.
     light, texture : float
         Variance of the light of the cells and of the texture, over that of noise.
+    unlikely : float
+        How unlikely the light of a cell is, as the logarithm of a variance.
     """
 
     keys: tuple[str, ...]
     values: Float64Array
     covariance: Float64Array
     weight: Float64Array
+    fine: Float64Array
     light: float
     texture: float
+    unlikely: float
 
     def evidence(self, before: ChangeFit, more: int) -> float:
         """Return the logarithm of how much more likely the frame is than before.
@@ -86,8 +95,11 @@ class ChangeFit:
         cells = self.weight.size
         of_light = 0.5 * 3.0 * cells / ALIKE
         of_texture = of_light * RUNS_OF_CELL * RUN / CORRELATED**2
-        gain = of_light * math.log(before.light / self.light)
-        gain += of_texture * math.log(before.texture / self.texture)
+        gain = of_light * (before.unlikely - self.unlikely)
+        # Cells differ in their texture: it is compared in those that follow both fits.
+        both = before.weight * self.weight
+        first, second = (both @ np.maximum(fit.fine, LEAST_SCALE) for fit in (before, self))
+        gain += of_texture * math.log(first / second) if second > 0.0 else 0.0
         return gain - 0.5 * more * math.log(max(3.0 * cells / ALIKE, 2.0))
 
 
@@ -171,11 +183,12 @@ class ChangeModel:
         texture = (self._across @ sums.change[..., None])[..., 0] - light
         square = (gains**2 / by_gain).sum(axis=1)
         values, inverse = np.zeros(at.size), np.zeros((at.size, at.size))
-        weight, scales = np.zeros(len(by_gain)), np.ones(2)
+        weight, fine, scales = np.zeros(len(by_gain)), np.zeros(len(by_gain)), np.ones(3)
         known = at, self._light, self._texture, light, texture
-        rest = square, sums.square - square, 3.0 * self.samples.count - 3.0, sums.full == 0.0
-        robust_fit(*known, *rest, self._prior[at], values, inverse, weight, scales)
-        return ChangeFit(tuple(keys), values, inverse, weight, *scales.tolist())
+        count = 3.0 * self.samples.count - 3.0
+        rest = square, sums.square - square, count, sums.full == 0.0
+        robust_fit(*known, *rest, self._prior[at], values, inverse, weight, fine, scales)
+        return ChangeFit(tuple(keys), values, inverse, weight, fine / count, *scales.tolist())
 
     def explain(self, sums: FrameSums, usual: Mapping[str, float]) -> FrameChange:
         """Return the explanations that make a frame more likely, added one by one.
@@ -327,11 +340,16 @@ class ChangeModel:
         return self.may_change_by_row(sums)
 
     def may_change_by_row(self, sums: FrameSums) -> bool:
-        """Return whether the medians of blocks of rows differ by more than runs scatter."""
+        """Return whether medians of blocks of rows differ by more than their noise.
+
+        Most do by flicker. By a step at the border, few do: by more than a contact would, too.
+        """
         share = (sums.run_change / self.samples.run_light).T[self._blocks]
         median = np.median(share, axis=1)
         within = np.median(np.abs(share - median[:, None]), axis=(0, 1)) / QUARTILE
         # Of a median of independent values.
         sd = np.sqrt(0.5 * math.pi / share.shape[1]) * within
-        between = np.median(np.abs(median - np.median(median, axis=0)), axis=0) / QUARTILE
-        return bool((between > SIGMAS * sd).any())
+        apart = np.abs(median - np.median(median, axis=0)) / sd
+        most, few = np.quantile(apart, (0.5, FEW), axis=0)
+        limit = SIGMAS * NormalDist().inv_cdf(0.5 * (1.0 + FEW)) * math.sqrt(ALIKE)
+        return bool((most > SIGMAS * QUARTILE).any() or (few > limit).any())

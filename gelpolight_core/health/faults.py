@@ -106,12 +106,12 @@ def judge_dark(frame: FrameEvidence) -> Iterator[Symptom]:
 
 
 def judge_compressed(frame: FrameEvidence) -> Iterator[Symptom]:
-    """Judge whether the image was processed: its grain is another one."""
+    """Judge whether the image was processed: its grain is another one, or it is sharper."""
     # Missing light and swapped colours change the grain, too.
     is_other_light = frame.likeness is Likeness.NONE and (
         (frame.light < DARK).any() or frame.colour_order is not None
     )
-    if not is_other_light and frame.processed > 1.0:
+    if not is_other_light and (frame.processed > 1.0 or frame.is_sharper):
         yield Symptom(frame.processed, far=not frame.untouched.any())
 
 
@@ -195,7 +195,9 @@ def judge_room_light(frame: FrameEvidence) -> Iterator[Symptom]:
     size = max(abs(float(offsets.mean())) / of_all, abs(offset) / of_one)
     far = abs(offset) > FAR * OFFSET
     needed = 1.0 if frame.has_clear_gain else SIGMAS
-    if size > needed and (far or not frame.has_moved_far):
+    if not (size > needed and (far or not frame.has_moved_far)):
+        return
+    if frame.explained is not None or frame.is_likelier_with("room_light"):
         yield Symptom(100.0 * offset, far)
 
 
@@ -227,8 +229,7 @@ def judge_camera_moved(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether the camera has moved."""
     if frame.shift_px is None:
         return
-    searched_px = frame.searched_px
-    if searched_px is not None and frame.shift_px == math.hypot(*searched_px):
+    if frame.shift_px == frame.searched_px:
         yield Symptom(frame.shift_px, frame.shift_px > FAR * SHIFT_PX, {"beyond": ""})
     elif frame.has_moved_far:  # the fit cannot follow so far
         yield Symptom(frame.shift_px, frame.excess.share < LEAST_START, {"beyond": " or more"})

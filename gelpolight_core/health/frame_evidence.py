@@ -32,7 +32,7 @@ from .fault_limits import (
 )
 from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
-from .movement import FOLLOWED_PX, Movement, search_movement
+from .movement import FOLLOWED_PX, MOVED, Movement, search_movement
 from .press_scatter import HealthyPressScatter
 from .press_test import press_effects
 from .robust_fit import CORRELATED
@@ -240,16 +240,17 @@ class FrameEvidence:
     def _compare_with_movement(self, change: FrameChange, sums: FrameSums) -> None:
         """Take a movement by more than the fit can follow instead of a change of the light.
 
-        It is taken if the frame is more likely with its two parameters.
+        It is taken if the frame is more likely with its few parameters.
         """
         found, model = self._search, self.reference.model
-        if found is None or math.hypot(*found.px) <= FOLLOWED_PX:
+        if found is None or found.size_px <= FOLLOWED_PX:
             return
         as_it_is, moved = model.fit(sums, ("gain",)), model.fit(found.sums, ("gain",))
         parameters = sum(model.at[key].size for key in change.fit.keys) - len(GAINS)
         if change.rows is not None:
             parameters += change.rows.shares.size
-        if moved.evidence(as_it_is, 2) > change.fit.evidence(as_it_is, parameters):
+        own = model.at[MOVED].size
+        if moved.evidence(as_it_is, own) > change.fit.evidence(as_it_is, parameters):
             self.explained, self.fit, self._has_jumped = None, found.common, True
 
     def _explain(self, sums: FrameSums) -> FrameChange | None:
@@ -271,9 +272,7 @@ class FrameEvidence:
         if PRESSED in change.worth:
             return change
         local = model.local(change.fit, [key for key in OF_PARTS if key in change.fit.keys])
-        moved = model.local(
-            change.fit, [key for key in ("camera_moved",) if key in change.fit.keys]
-        )
+        moved = model.local(change.fit, [key for key in (MOVED,) if key in change.fit.keys])
         local[:, FINE] += moved[:, FINE] - moved[:, FINE].mean(axis=0)
         left = model.without(change.sums, local)
         self.fit = common_change(self.samples, left.change, left.square, left.full)
@@ -305,6 +304,11 @@ class FrameEvidence:
         if self.explained is None or set(self.explained.fit.keys) != {"gain", "blurred"}:
             return False
         return self.explained.fit.light < CLEAR**2
+
+    @property
+    def is_sharper(self) -> bool:
+        """Whether the image has more detail than at calibration."""
+        return self.explains("blurred") and bool(self.values_of("blurred")[0] < 0.0)
 
     def values_of(self, key: str) -> Float64Array:
         """Return the parameters of an explanation that was found."""
@@ -395,19 +399,19 @@ class FrameEvidence:
     # The position, and the detail
 
     @cached_property
-    def searched_px(self) -> tuple[float, float] | None:
+    def searched_px(self) -> float | None:
         """Movement of the membrane in the image by a search, None without one or a result."""
         is_near = self.likeness is Likeness.MEMBRANE and self._may_have_moved
         if self.is_smooth:
             return None
         if self._whole and (is_near or self.likeness is Likeness.NONE):
-            return None if self._search is None else self._search.px
+            return None if self._search is None else self._search.size_px
         return None
 
     @cached_property
     def _search(self) -> Movement | None:
         """The movement that makes the frame most like the membrane."""
-        return search_movement(self.samples, self._raw, self._levels)
+        return search_movement(self.reference.model, self._raw, self._levels)
 
     @property
     def _may_have_moved(self) -> bool:
@@ -420,36 +424,37 @@ class FrameEvidence:
     def shift_px(self) -> float | None:
         """Size of the movement, None where it is within noise."""
         if self.searched_px is not None:
-            searched = math.hypot(*self.searched_px)
-            if searched > SHIFT_PX or self.likeness is Likeness.NONE:
-                return searched
+            if self.searched_px > FOLLOWED_PX or self.likeness is Likeness.NONE:
+                return self.searched_px
         if self.likeness is not Likeness.MEMBRANE:
             return None
         values, sd = self.excess.values, self.excess.sd
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         if self.explained is None:
-            return size if size > limit and self._is_likelier_moved else None
-        if not self.explains("camera_moved"):
+            return size if size > limit and self.is_likelier_with(MOVED) else None
+        if not self.explains(MOVED):
             return None
         if self._has_turned:
-            moved = self.reference.model.local(self.explained.fit, ("camera_moved",))
+            moved = self.reference.model.local(self.explained.fit, (MOVED,))
             size = math.sqrt(float((moved[:, [SHIFT_U, SHIFT_V]] ** 2).sum(axis=1).mean()))
         return None if size < limit else size
 
-    @property
-    def _is_likelier_moved(self) -> bool:
-        """Whether a movement makes the frame more likely: patterns of light look like a shift."""
+    def is_likelier_with(self, key: str) -> bool:
+        """Return whether an explanation alone makes the frame more likely.
+
+        Patterns of light look a little like any of them.
+        """
         model = self.reference.model
-        still, moved = (model.fit(self._sums, k) for k in (("gain",), ("gain", "camera_moved")))
-        return moved.evidence(still, model.at["camera_moved"].size) > 0.0
+        without, with_it = (model.fit(self._sums, k) for k in (("gain",), ("gain", key)))
+        return with_it.evidence(without, model.at[key].size) > 0.0
 
     @property
     def _has_turned(self) -> bool:
         """Whether a movement is more than a shift."""
         assert self.explained is not None
-        sd = np.sqrt(np.diag(self.explained.fit.covariance)[self._at("camera_moved")])
-        return bool((np.abs(self.values_of("camera_moved"))[2:] > SIGMAS * sd[2:]).any())
+        sd = np.sqrt(np.diag(self.explained.fit.covariance)[self._at(MOVED)])
+        return bool((np.abs(self.values_of(MOVED))[2:] > SIGMAS * sd[2:]).any())
 
     @property
     def has_moved_far(self) -> bool:

@@ -121,8 +121,12 @@ class HealthCheck:
             # As it looks in the light at calibration.
             gain = np.maximum(1.0 + np.median(self._reference.light, axis=0), DARK)
             same = (light / gain[:, None]).astype(np.float32)
-            found = search_movement(self.samples, raw, same) if np.hypot(*sd) < most_sd else None
-            return None if found is None else found.px
+            model = self._reference.model
+            found = search_movement(model, raw, same) if np.hypot(*sd) < most_sd else None
+            if found is None:
+                return None
+            u, v = found.px.mean(axis=0).tolist()
+            return u, v
 
     def _bad_pixels(self, raw: NDArray[Any], light: Float32Array, whole: bool) -> BadPixelCount:
         height = raw.shape[0]

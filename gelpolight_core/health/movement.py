@@ -1,28 +1,32 @@
 """Camera movement against the membrane that is too large for the fit.
 
 The samples are compared with shifted positions: first on a coarse lattice of shifts, then on finer
-ones about the best. The fit finds the rest.
+ones about the best. From there the fit follows a shift, a turn and a zoom, step by step.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import SATURATED
 
-from .change_fit import FrameSums
+from .change_fit import ChangeModel, FrameSums
 from .global_change import LEAST_START, GlobalChange, common_change
-from .health_samples import PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples, compare_samples
+from .health_samples import PARAMETERS, RUN, SHIFT_U, SHIFT_V, compare_samples
 
 Lattice = tuple[int, int]
 LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
 """Reach and step in px: within 4 px the membrane still looks like itself."""
 FOLLOWED_PX = 1.5
 """Largest movement that the fit can follow."""
+STEPS = 8
+"""Most steps of the fit; it ends where one makes nothing better."""
+MOVED = "camera_moved"
 
 
 class Movement(NamedTuple):
@@ -30,55 +34,66 @@ class Movement(NamedTuple):
 
     Attributes
     ----------
-    px : (float, float)
-        Along u and v.
+    px : (cells, 2)
+        Along u and v, of each cell.
     sums : FrameSums
-        Of the frame with the nearest whole pixels undone.
+        Of the frame with the movement undone.
     common : GlobalChange
         Change of the light, with the movement undone.
     """
 
-    px: tuple[float, float]
+    px: Float64Array
     sums: FrameSums
     common: GlobalChange
 
+    @property
+    def size_px(self) -> float:
+        """Root of the mean square over the cells."""
+        return math.sqrt(float((self.px**2).sum(axis=1).mean()))
 
-def search_movement(
-    samples: HealthSamples, raw: NDArray[Any], light: Float32Array
-) -> Movement | None:
-    """Return the movement of the membrane in the image, or None if no shift explains it.
+
+def search_movement(model: ChangeModel, raw: NDArray[Any], light: Float32Array) -> Movement | None:
+    """Return the movement of the membrane in the image, or None if none explains it.
 
     Parameters
     ----------
-    samples : HealthSamples
-        Samples of the background.
+    model : ChangeModel
+        Explanations of the sensor's frames.
     raw : (height, width, 3) uint8 or uint16
         The frame.
     light : (3, levels) float32
         Linear light of every number.
     """
+    samples = model.samples
     cells, runs = samples.count.size, samples.run_cell.size
-    change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
-    background = samples.part, samples.run_cell, samples.expected, samples.effects, samples.weight
-    sums = FrameSums(change, square, full, np.zeros((3, runs)))
-    most = np.array(raw.shape[:2], np.int32) - 2
+    most = np.array(raw.shape[:2]) - 2
+    cell = samples.run_cell.repeat(RUN)
 
-    def off(u: int, v: int) -> float:
-        """Return the difference between image and background after a shift."""
-        corner = np.clip(samples.corner + np.array([v, u], np.int32), 0, most)
-        compare_samples(raw, light, np.float32(SATURATED), corner, *background, *sums)
+    def moved(px: Float64Array) -> tuple[float, FrameSums]:
+        """Return the difference between image and background after a movement, and the sums."""
+        change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
+        sums = FrameSums(change, square, full, np.zeros((3, runs)))
+        at = (samples.corner + samples.part + px[cell, ::-1]).clip(0.0, most)
+        corner = at.astype(np.int32)
+        place = corner, (at - corner).astype(np.float32)
+        background = samples.run_cell, samples.expected, samples.effects, samples.weight
+        compare_samples(raw, light, np.float32(SATURATED), *place, *background, *sums)
         # Independent of pressed objects: the majority of cells decides.
-        return float(np.median(square / samples.count))
+        return float(np.median(square / samples.count)), sums
 
-    u, v = 0, 0
+    middle = np.zeros(2)
     for reach, step in LATTICES:
         steps = range(-reach, reach + 1, step)
-        u, v = min(((u + i, v + j) for i in steps for j in steps), key=lambda at: off(*at))
-    off(u, v)
-    common = common_change(samples, change, square, full)
-    if common.share <= LEAST_START:
-        return None
-    rest = common.values[[SHIFT_U, SHIFT_V]]
-    if np.hypot(*rest) > FOLLOWED_PX:
-        rest = np.zeros(2)
-    return Movement((float(u + rest[0]), float(v + rest[1])), sums, common)
+        shifts = [middle + (i, j) for i in steps for j in steps]
+        middle = min(shifts, key=lambda px: moved(np.tile(px, (cells, 1)))[0])
+    px = np.tile(middle, (cells, 1))
+    off, sums = moved(px)
+    for _ in range(STEPS):
+        change = model.local(model.fit(sums, ("gain", MOVED)), (MOVED,))
+        further = px + change[:, [SHIFT_U, SHIFT_V]]
+        less, left = moved(further)
+        if not less < off:
+            break
+        px, off, sums = further, less, left
+    common = common_change(samples, sums.change, sums.square, sums.full)
+    return Movement(px, sums, common) if common.share > LEAST_START else None

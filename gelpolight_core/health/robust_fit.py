@@ -16,7 +16,8 @@ TAIL = 4.0
 """A cell whose variance is larger than the scale by this factor has a quarter of its weight."""
 SETTLED = 0.002
 BALANCE = 0.65
-"""Mean of the bounded loss at which the scale is found: half of the cells may be pressed."""
+"""Mean of the bounded loss at which the scale is found: half of the cells may be pressed. It makes
+the scale the most likely one of a Student distribution of the light of a cell."""
 
 
 @whole(fastmath=True)
@@ -34,12 +35,13 @@ def robust_fit(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     values,
     inverse,
     weight,
+    fine,
     scales,
 ):
-    """Fit parameters `at` by the cells that agree; write the last four arguments."""
+    """Fit parameters `at` by the cells that agree; write the last five arguments."""
     cells, size = usable.size, at.size
     correlated = CORRELATED * CORRELATED
-    rest, fine = np.zeros(cells), np.zeros(cells)
+    rest = np.zeros(cells)
     number, scale, grain = 0, 1.0, 1.0
     for c in range(cells):
         weight[c] = 1.0 if usable[c] else 0.0
@@ -92,4 +94,8 @@ def robust_fit(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         grain = max(above / below, LEAST_SCALE)
         if abs(scale - before) < SETTLED * scale:
             break
-    scales[0], scales[1] = scale, grain
+    unlikely = 0.0
+    for c in range(cells):
+        if usable[c]:
+            unlikely += np.log(1.0 + rest[c] / scale)
+    scales[0], scales[1], scales[2] = scale, grain, np.log(scale) + unlikely / (number * BALANCE)

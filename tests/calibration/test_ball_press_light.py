@@ -22,8 +22,8 @@ from gelpolight_core.session.session import read_session
 def balls_in_light(small_project, tmp_path):
     """Return a function that gives the balls of the small session in changed light.
 
-    It takes the gain of each channel (presses, 3), and the room light of each press in grey levels.
-    The camera rounds once more, about numbers that no rounding has made regular.
+    It takes the gain of each channel (presses, 3) or of each row (presses, rows, 1, 1), and the
+    room light of each press in grey levels. The camera rounds once more, about numbers that no rounding has made regular.
     """
 
     def compute(gains: NDArray[np.float64], room_light: NDArray[np.float64]) -> BallsStageResult:
@@ -32,7 +32,7 @@ def balls_in_light(small_project, tmp_path):
         paths = sorted((folder / "balls").iterdir())
         for path, gain, offset in zip(paths, gains, room_light, strict=True):
             light = cv2.imread(str(path)).astype(np.float64)
-            changed = light * gain[::-1] + offset + random.uniform(-0.5, 0.5, light.shape)
+            changed = light * gain[..., ::-1] + offset + random.uniform(-0.5, 0.5, light.shape)
             changed = np.where(light < 255.0, changed, light)
             cv2.imwrite(str(path), np.clip(np.rint(changed), 0.0, 255.0).astype(np.uint8))
         return run_stage(FULL, BALLS, read_session(folder), small_project.results)[BALLS]
@@ -81,6 +81,17 @@ def test_leds_that_warm_up_are_corrected_press_by_press(small_project, balls_in_
         assert ball.press.pose.depth_mm == pytest.approx(other.press.pose.depth_mm, rel=0.03)
         offset_mm = np.subtract(ball.press.pose.centre_mm, other.press.pose.centre_mm)
         assert np.hypot(*offset_mm) < 0.05
+
+
+def test_light_that_flickers_by_row_is_corrected_press_by_press(small_project, balls_in_light):
+    gains, room_light = unchanged(small_project.results[BALLS])
+    row = np.linspace(0.0, 1.0, small_project.results[BACKGROUND].linear.shape[0])
+    phase = np.arange(len(gains))[:, None]
+    flickers = 1.0 + 0.03 * np.sin(17.0 * row + phase)
+    balls = balls_in_light(flickers[..., None, None], room_light)
+    assert all(ball.light.corrected == ("rows",) for ball in balls.seen)
+    assert "from row to row" in light_finding(balls).remedy
+    assert light_finding(balls).verdict is Verdict.WARN
 
 
 def test_one_press_in_other_light_is_corrected(small_project, balls_in_light):

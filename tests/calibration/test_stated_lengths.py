@@ -54,6 +54,7 @@ def on_dome(flat: BallPixels, pose: BallPose, known: Truth, rise_mm: float) -> B
         pytest.param("square", 1.04, "the squares of the board", marks=pytest.mark.long),
         ("led_height", 0.7, "the LED height (19."),
         ("response", 1.1, "an exponent of 1.1"),
+        ("contrast", 0.9, "presses have 0.90 of their contrast"),
         pytest.param("membrane", 1.5, "a cap 1.", marks=pytest.mark.long),
     ],
 )
@@ -68,6 +69,8 @@ def test_what_is_stated_wrong_is_named(key, stated, named):
         pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
     if key == "response":
         pixels = [replace(p, ratio=p.ratio ** (1.0 / stated)) for p in pixels]
+    if key == "contrast":
+        pixels = [replace(p, ratio=stated * p.ratio + 1.0 - stated) for p in pixels]
     if key in ("layers", "square"):
         pixels = [replace(p, points_mm=stated * p.points_mm) for p in pixels]
     if key == "membrane":
@@ -96,6 +99,16 @@ def test_two_lengths_that_explain_the_presses_equally_well_are_both_named():
     assert "of elastomer or" in figure.remedy
     assert "the LED height (15.1 mm fits)" in figure.remedy
     assert "diameters" not in figure.remedy
+
+
+def test_a_wrong_length_is_more_likely_than_a_camera_that_blends_its_frames():
+    stated = [
+        StatedLengthFit("contrast", 0.96, 0.004, 102.0, asked=True),
+        StatedLengthFit("radius", 1.03, 0.004, 100.0),
+    ]
+    stated.sort(key=lambda one: one.unlikely)
+    (figure,) = judge_stated_lengths(stated, SENSOR, STACK, FIELD_MM)
+    assert figure.remedy.index("diameters") < figure.remedy.index("noise reduction")
 
 
 @pytest.mark.parametrize("asked", [False, True])

@@ -53,6 +53,7 @@ CORRECTED: dict[str, tuple[str, Callable[[Map], Map]]] = {
     "flicker of one LED": ("rows", by_row(lambda y: 0.03 * np.sin(9.0 * y + 2.0), 0)),
     "pulses": ("rows", by_row(lambda y: 0.03 * np.sin(90.0 * y))),
     "exposure in mid frame": ("rows", by_row(lambda y: 0.03 * (y > 0.45))),
+    "exposure in the last quarter": ("rows", by_row(lambda y: -0.03 * (y > 0.75))),
     "colour matrix": ("colour_mixing", lambda frame: frame @ MIXED.T),
 }
 
@@ -68,6 +69,18 @@ def test_what_changes_parts_of_a_frame_is_named_and_corrected(known, sensor, fra
     deepest = usual.depth_mm > 0.8 * usual.depth_mm.max()
     off_mm = float((found.depth_mm - usual.depth_mm)[deepest].mean())
     assert abs(off_mm) < 0.01 * float(usual.depth_mm.max())
+
+
+def test_a_zoom_beyond_what_the_fit_follows_is_a_movement(known, sensor, frame):
+    rows, columns = frame.shape[:2]
+    middle = 0.5 * (columns - 1), 0.5 * (rows - 1)
+    zoom = cv2.getRotationMatrix2D(middle, 0.0, 1.02)
+    zoomed = cv2.warpAffine(frame, zoom, (columns, rows), borderMode=cv2.BORDER_REPLICATE)
+    health = sensor.health(known.noisy(zoomed))
+    assert health.findings[0].key == "camera_moved"
+    y, x = np.mgrid[:rows, :columns]
+    largest_px = 0.02 * float(np.hypot(x - middle[0], y - middle[1]).max())
+    assert 0.3 * largest_px < health.findings[0].value < largest_px
 
 
 def test_a_curve_of_brightness_is_named_and_leaves_the_depth_doubtful(known, sensor, frame):

@@ -269,6 +269,45 @@ def as_jpeg(image: Levels) -> Levels:
     return np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)[..., ::-1], np.float64)
 
 
+def cropped(image: Levels) -> Levels:
+    """Return an image that the firmware crops at another place."""
+    return np.roll(image, 8, 1)
+
+
+def by_row(light: Callable[[Levels], Levels]) -> ImageChange:
+    """Return light that changes by row, as a function of the place from top to bottom, 0..1.
+
+    Each image has a phase of its own.
+    """
+
+    def change(image: Levels) -> Levels:
+        phase = np.random.default_rng(zlib.crc32(image.tobytes())).uniform()
+        return image * light(np.linspace(0.0, 1.0, len(image)) + phase)[:, None, None]
+
+    return change
+
+
+def flicker(y: Levels) -> Levels:
+    """Return light that flickers by 3 %."""
+    return 1.0 + 0.03 * np.sin(2.0 * np.pi * 2.7 * y)
+
+
+def step(y: Levels) -> Levels:
+    """Return light that becomes brighter by 3 % in mid frame."""
+    return np.where(y < 1.0, 1.0, 1.03)
+
+
+def denoised(image: Levels) -> Levels:
+    """Return an image after the noise reduction of a camera."""
+    return np.asarray(cv2.bilateralFilter(image.astype(np.float32), 9, 12.0, 3.0), np.float64)
+
+
+def blended(share: float, folder: Path) -> None:
+    """Blend the untouched membrane into the images of the balls."""
+    untouched = read_raw_image(next((folder / BARE).glob("*.png"))).rgb
+    each(lambda image: (1.0 - share) * image + share * untouched, BALLS)(folder)
+
+
 def copy_ball(folder: Path) -> None:
     """Store one ball image under the name of another one, too."""
     shutil.copyfile(folder / BALLS / ODD, folder / BALLS / LIKE_ODD)
@@ -290,6 +329,7 @@ def cases() -> tuple[ChangedSession, ...]:
     lens, dim = r"\blens\b|focus|focal|zoom", "exposure|white ?board (is|was) "
     colours, room = f"{LIGHT}|{UNMODELLED}|colou?r|white balance|crosstalk", f"{LIGHT}|room light"
     of_all, steady = "ball diameters|diameters of the balls", "moved|turned|camera"
+    rolling, contrast = "row|flicker|mid frame", "blend|contrast|frame before|noise reduction"
     lift, swap = 0.005 * 255.0, {ODD: OTHER, OTHER: ODD}
     return (
         row("unchanged", "nothing", lambda _: None, "(?!)", True),
@@ -327,6 +367,12 @@ def cases() -> tuple[ChangedSession, ...]:
         row("jpeg", "balls, quality 40", each(as_jpeg, BALLS), "compress|jpeg|png|noise"),
         row("camera_moved", "3 px from balls on", each(moved(3.0), *AFTER), steady),
         row("camera_turned", "0.3 deg from balls on", each(moved(0.0, 0.3), *AFTER), steady),
+        row("cropped", "8 px after the views", each(cropped, *LIT), steady),
+        row("flicker", "3 %, in all images", each(by_row(flicker), *LIT), rolling),
+        row("flicker_balls", "3 %", each(by_row(flicker), BALLS), rolling),
+        row("mid_frame", "+3 % in balls", each(by_row(step), BALLS), rolling),
+        row("blended", "10 % of the background in balls", partial(blended, 0.1), contrast),
+        row("denoised", "balls", each(denoised, BALLS), "process|noise|compress"),
         row("worn", "spot at 40 % light", each(spot(0.4), *BARE_ON), WORN, True),
         row("dots", "printed, 30 % light", each(dots(0.3), *BARE_ON), WORN, True),
         row("touched", "spot at 80 %", each(spot(0.8), BARE), "background_place|touch|lay on"),
