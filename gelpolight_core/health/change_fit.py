@@ -22,7 +22,7 @@ from gelpolight_core.base.arrays import Float64Array
 from .explanations import GAINS, MOST, OFFSETS, PRESSED, explanations
 from .fault_limits import SIGMAS
 from .health_samples import BLUR, RUN, RUNS_OF_CELL, SHIFT_U, SHIFT_V, HealthSamples
-from .robust_fit import CORRELATED, LEAST_SCALE, robust_fit
+from .robust_fit import CORRELATED, robust_fit
 from .row_light import QUARTILE, RowLight, fit_rows
 
 ALIKE = 9.0
@@ -65,8 +65,6 @@ class ChangeFit:
         Of the parameters.
     weight : (cells,)
         1 where a cell follows, 0 where it does not.
-    fine : (cells,)
-        Variance of the texture that is left in each cell, over that of noise.
     light, texture : float
         Variance of the light of the cells and of the texture, over that of noise.
     unlikely : float
@@ -77,7 +75,6 @@ class ChangeFit:
     values: Float64Array
     covariance: Float64Array
     weight: Float64Array
-    fine: Float64Array
     light: float
     texture: float
     unlikely: float
@@ -96,10 +93,7 @@ class ChangeFit:
         of_light = 0.5 * 3.0 * cells / ALIKE
         of_texture = of_light * RUNS_OF_CELL * RUN / CORRELATED**2
         gain = of_light * (before.unlikely - self.unlikely)
-        # Cells differ in their texture: it is compared in those that follow both fits.
-        both = before.weight * self.weight
-        first, second = (both @ np.maximum(fit.fine, LEAST_SCALE) for fit in (before, self))
-        gain += of_texture * math.log(first / second) if second > 0.0 else 0.0
+        gain += of_texture * math.log(before.texture / self.texture)
         return gain - 0.5 * more * math.log(max(3.0 * cells / ALIKE, 2.0))
 
 
@@ -183,12 +177,11 @@ class ChangeModel:
         texture = (self._across @ sums.change[..., None])[..., 0] - light
         square = (gains**2 / by_gain).sum(axis=1)
         values, inverse = np.zeros(at.size), np.zeros((at.size, at.size))
-        weight, fine, scales = np.zeros(len(by_gain)), np.zeros(len(by_gain)), np.ones(3)
+        weight, scales = np.zeros(len(by_gain)), np.ones(3)
         known = at, self._light, self._texture, light, texture
-        count = 3.0 * self.samples.count - 3.0
-        rest = square, sums.square - square, count, sums.full == 0.0
-        robust_fit(*known, *rest, self._prior[at], values, inverse, weight, fine, scales)
-        return ChangeFit(tuple(keys), values, inverse, weight, fine / count, *scales.tolist())
+        rest = square, sums.square - square, 3.0 * self.samples.count - 3.0, sums.full == 0.0
+        robust_fit(*known, *rest, self._prior[at], values, inverse, weight, scales)
+        return ChangeFit(tuple(keys), values, inverse, weight, *scales.tolist())
 
     def explain(self, sums: FrameSums, usual: Mapping[str, float]) -> FrameChange:
         """Return the explanations that make a frame more likely, added one by one.
@@ -349,7 +342,6 @@ class ChangeModel:
         within = np.median(np.abs(share - median[:, None]), axis=(0, 1)) / QUARTILE
         # Of a median of independent values.
         sd = np.sqrt(0.5 * math.pi / share.shape[1]) * within
-        apart = np.abs(median - np.median(median, axis=0)) / sd
-        most, few = np.quantile(apart, (0.5, FEW), axis=0)
+        most, few = np.quantile(np.abs(median - np.median(median, axis=0)), (0.5, FEW), axis=0)
         limit = SIGMAS * NormalDist().inv_cdf(0.5 * (1.0 + FEW)) * math.sqrt(ALIKE)
-        return bool((most > SIGMAS * QUARTILE).any() or (few > limit).any())
+        return bool((most > SIGMAS * QUARTILE * sd).any() or (few > limit * sd).any())

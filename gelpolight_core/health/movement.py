@@ -84,16 +84,18 @@ def search_movement(model: ChangeModel, raw: NDArray[Any], light: Float32Array) 
     middle = np.zeros(2)
     for reach, step in LATTICES:
         steps = range(-reach, reach + 1, step)
-        shifts = [middle + (i, j) for i in steps for j in steps]
+        shifts = [middle + np.array([i, j]) for i in steps for j in steps]
         middle = min(shifts, key=lambda px: moved(np.tile(px, (cells, 1)))[0])
     px = np.tile(middle, (cells, 1))
-    off, sums = moved(px)
+    _, sums = moved(px)
+    fit = model.fit(sums, ("gain",))
     for _ in range(STEPS):
         change = model.local(model.fit(sums, ("gain", MOVED)), (MOVED,))
         further = px + change[:, [SHIFT_U, SHIFT_V]]
-        less, left = moved(further)
-        if not less < off:
+        _, left = moved(further)
+        closer = model.fit(left, ("gain",))
+        if not closer.evidence(fit, 0) > 0.0:
             break
-        px, off, sums = further, less, left
+        px, sums, fit = further, left, closer
     common = common_change(samples, sums.change, sums.square, sums.full)
     return Movement(px, sums, common) if common.share > LEAST_START else None

@@ -35,13 +35,12 @@ def robust_fit(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     values,
     inverse,
     weight,
-    fine,
     scales,
 ):
-    """Fit parameters `at` by the cells that agree; write the last five arguments."""
+    """Fit parameters `at` by the cells that agree; write the last four arguments."""
     cells, size = usable.size, at.size
     correlated = CORRELATED * CORRELATED
-    rest = np.zeros(cells)
+    rest, fine = np.zeros(cells), np.zeros(cells)
     number, scale, grain = 0, 1.0, 1.0
     for c in range(cells):
         weight[c] = 1.0 if usable[c] else 0.0

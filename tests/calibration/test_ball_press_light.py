@@ -23,7 +23,8 @@ def balls_in_light(small_project, tmp_path):
     """Return a function that gives the balls of the small session in changed light.
 
     It takes the gain of each channel (presses, 3) or of each row (presses, rows, 1, 1), and the
-    room light of each press in grey levels. The camera rounds once more, about numbers that no rounding has made regular.
+    room light of each press in grey levels. The camera rounds once more, about numbers that no
+    rounding has made regular.
     """
 
     def compute(gains: NDArray[np.float64], room_light: NDArray[np.float64]) -> BallsStageResult:
@@ -85,7 +86,7 @@ def test_leds_that_warm_up_are_corrected_press_by_press(small_project, balls_in_
 
 def test_light_that_flickers_by_row_is_corrected_press_by_press(small_project, balls_in_light):
     gains, room_light = unchanged(small_project.results[BALLS])
-    row = np.linspace(0.0, 1.0, small_project.results[BACKGROUND].linear.shape[0])
+    row = np.linspace(0.0, 1.0, small_project.results[BACKGROUND].bad.height)
     phase = np.arange(len(gains))[:, None]
     flickers = 1.0 + 0.03 * np.sin(17.0 * row + phase)
     balls = balls_in_light(flickers[..., None, None], room_light)
