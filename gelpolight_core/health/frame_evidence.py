@@ -245,12 +245,11 @@ class FrameEvidence:
         found, model = self._search, self.reference.model
         if found is None or found.size_px <= FOLLOWED_PX:
             return
-        as_it_is, moved = model.fit(sums, ("gain",)), model.fit(found.sums, ("gain",))
+        as_it_is = model.fit(sums, ("gain",))
         parameters = sum(model.at[key].size for key in change.fit.keys) - len(GAINS)
         if change.rows is not None:
             parameters += change.rows.shares.size
-        own = model.at[MOVED].size
-        if moved.evidence(as_it_is, own) > change.fit.evidence(as_it_is, parameters):
+        if self._moved_evidence > change.fit.evidence(as_it_is, parameters):
             self.explained, self.fit, self._has_jumped = None, found.common, True
 
     def _explain(self, sums: FrameSums) -> FrameChange | None:
@@ -413,6 +412,15 @@ class FrameEvidence:
         """The movement that makes the frame most like the membrane."""
         return search_movement(self.reference.model, self._raw, self._levels)
 
+    @cached_property
+    def _moved_evidence(self) -> float:
+        """The logarithm of how much more likely the frame is with the movement searched for."""
+        if self._search is None:
+            return -math.inf
+        model = self.reference.model
+        before, after = (model.fit(s, ("gain",)) for s in (self._sums, self._search.sums))
+        return after.evidence(before, model.at[MOVED].size)
+
     @property
     def _may_have_moved(self) -> bool:
         """Whether the camera may have moved by more than the fit can follow."""
@@ -424,7 +432,10 @@ class FrameEvidence:
     def shift_px(self) -> float | None:
         """Size of the movement, None where it is within noise."""
         if self.searched_px is not None:
-            if self.searched_px > FOLLOWED_PX or self.likeness is Likeness.NONE:
+            is_sure = (
+                self.likeness is Likeness.NONE or self._moved_evidence > self._rival_of_movement
+            )
+            if is_sure and (self.searched_px > SHIFT_PX or self.likeness is Likeness.NONE):
                 return self.searched_px
         if self.likeness is not Likeness.MEMBRANE:
             return None
@@ -432,7 +443,8 @@ class FrameEvidence:
         size = math.hypot(values[SHIFT_U], values[SHIFT_V])
         limit = max(SIGMAS * math.hypot(sd[SHIFT_U], sd[SHIFT_V]), SHIFT_PX)
         if self.explained is None:
-            return size if size > limit and self.is_likelier_with(MOVED) else None
+            is_likely = size > limit and self._evidence.get(MOVED, 0.0) > self._rival_of_movement
+            return size if is_likely else None
         if not self.explains(MOVED):
             return None
         if self._has_turned:
@@ -441,13 +453,18 @@ class FrameEvidence:
         return None if size < limit else size
 
     def is_likelier_with(self, key: str) -> bool:
-        """Return whether an explanation alone makes the frame more likely.
+        """Return whether an explanation alone makes the frame more likely."""
+        return self._evidence.get(key, 0.0) > 0.0
 
-        Patterns of light look a little like any of them.
-        """
-        model = self.reference.model
-        without, with_it = (model.fit(self._sums, k) for k in (("gain",), ("gain", key)))
-        return with_it.evidence(without, model.at[key].size) > 0.0
+    @cached_property
+    def _evidence(self) -> dict[str, float]:
+        """Of each explanation alone."""
+        return self.reference.model.evidence(self._sums)
+
+    @property
+    def _rival_of_movement(self) -> float:
+        """Evidence for the best other explanation: patterns of light look a little like a shift."""
+        return max(0.0, *(found for key, found in self._evidence.items() if key != MOVED))
 
     @property
     def _has_turned(self) -> bool:
