@@ -16,7 +16,6 @@ from gelpolight_core.base.membrane_masks import LEAST_LIGHT, saturated_mask
 from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.geometry.resampling import ResamplingTable
 from gelpolight_core.health.faults import LIGHT
-from gelpolight_core.health.frame_evidence import OF_PARTS
 from gelpolight_core.health.frame_health import LightGain
 from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.press_scatter import open_press_scatter
@@ -99,8 +98,6 @@ def measure_press_light(rgb: Float32Array, check: HealthCheck) -> PressLight:
         largest = float(np.abs(rgb[lit] / before[lit] - 1.0).max(initial=0.0))
     uncorrected = tuple(fault.key for fault in health.faults if fault.key in LIGHT)
     found = [finding.key for finding in health.findings if finding.key in LIGHT]
-    # A pattern of light changes its mean, too: it is named first.
-    found.sort(key=lambda key: key not in OF_PARTS)
     corrected = tuple(key for key in found if gain is not None and key not in uncorrected)
     return PressLight(gain, largest, corrected, uncorrected)
 

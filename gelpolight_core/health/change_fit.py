@@ -210,8 +210,7 @@ class ChangeModel:
                 break
             most = max(found[0] for found in further)
             # Of those that are as likely, the first one of the list is the most usual.
-            near = max(SURE, LEAST_OF_FIRST * most)
-            likely = [found for found in further if found[0] > most - near]
+            likely = [found for found in further if found[0] > most - SURE]
             gain, key, change = likely[0]
             worth[key] = gain
             if key == PRESSED:

@@ -303,11 +303,12 @@ def judge_bad_line(frame: FrameEvidence) -> Iterator[Symptom]:
 
 _AGAIN = "set to zero or capture the background again"
 _NEW_CAMERA = "Calibrate again, so that they are left out, or replace the camera"
-LIGHT = ("led_off", "led_weak", "exposure", "uneven", "rows", "colour_mixing", "room_light")
+LIGHT = ("led_off", "uneven", "rows", "colour_mixing", "led_weak", "exposure", "room_light")
 """Changes of the light."""
 CORRECTABLE = ("exposure", "led_weak", "uneven", "rows", "colour_mixing")
 SHOWS_PIXELS = (Likeness.MEMBRANE, Likeness.COVERED, Likeness.PRESSED)
 
+# A pattern of light changes its mean, too: patterns come before what changes all light.
 FAULTS = (
     Fault(
         "dark",
@@ -346,20 +347,6 @@ FAULTS = (
         (Likeness.MEMBRANE, Likeness.NONE),
     ),
     Fault(
-        "led_weak",
-        "the {name} LED is {n:.1f} % {how} than at calibration",
-        f"Let the LEDs warm up and check their current; then {_AGAIN}",
-        judge_led_weak,
-        "%",
-    ),
-    Fault(
-        "exposure",
-        "the light is {n:.1f} % {how} than at calibration: exposure, gain or LEDs changed",
-        f"Restore the camera settings of the calibration, or {_AGAIN}",
-        judge_exposure,
-        "%",
-    ),
-    Fault(
         "uneven",
         "parts of the image are up to {n:.1f} % {how} than at calibration",
         f"Clean the lens and check that nothing shades it; then {_AGAIN}",
@@ -394,6 +381,20 @@ FAULTS = (
         # A curve looks like room light and changes the grain.
         hides=("room_light", "compressed"),
         rival="another curve of brightness",
+    ),
+    Fault(
+        "led_weak",
+        "the {name} LED is {n:.1f} % {how} than at calibration",
+        f"Let the LEDs warm up and check their current; then {_AGAIN}",
+        judge_led_weak,
+        "%",
+    ),
+    Fault(
+        "exposure",
+        "the light is {n:.1f} % {how} than at calibration: exposure, gain or LEDs changed",
+        f"Restore the camera settings of the calibration, or {_AGAIN}",
+        judge_exposure,
+        "%",
     ),
     Fault(
         "room_light",
