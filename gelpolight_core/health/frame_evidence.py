@@ -414,12 +414,15 @@ class FrameEvidence:
 
     @cached_property
     def _moved_evidence(self) -> float:
-        """The logarithm of how much more likely the frame is with the movement searched for."""
+        """The logarithm of how much more likely the frame is with the movement searched for.
+
+        It is that beyond what healthy presses reach.
+        """
         if self._search is None:
             return -math.inf
-        model = self.reference.model
+        model, usual = self.reference.model, self.reference.usual.evidence
         before, after = (model.fit(s, ("gain",)) for s in (self._sums, self._search.sums))
-        return after.evidence(before, model.at[MOVED].size)
+        return after.evidence(before, model.at[MOVED].size) - usual.get(MOVED, 0.0)
 
     @property
     def _may_have_moved(self) -> bool:

@@ -73,9 +73,9 @@ def search_movement(model: ChangeModel, raw: NDArray[Any], light: Float32Array) 
         """Return the difference between image and background after a movement, and the sums."""
         change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
         sums = FrameSums(change, square, full, np.zeros((3, runs)))
-        at = (samples.corner + samples.part + px[cell, ::-1]).clip(0.0, most)
-        corner = at.astype(np.int32)
-        place = corner, (at - corner).astype(np.float32)
+        # By whole pixels: between others, interpolation would take noise away.
+        at = samples.corner + np.rint(px).astype(np.int32)[cell, ::-1]
+        place = at.clip(0, most).astype(np.int32), samples.part
         background = samples.run_cell, samples.expected, samples.effects, samples.weight
         compare_samples(raw, light, np.float32(SATURATED), *place, *background, *sums)
         # Independent of pressed objects: the majority of cells decides.
@@ -90,12 +90,13 @@ def search_movement(model: ChangeModel, raw: NDArray[Any], light: Float32Array) 
     _, sums = moved(px)
     fit = model.fit(sums, ("gain",))
     for _ in range(STEPS):
-        change = model.local(model.fit(sums, ("gain", MOVED)), (MOVED,))
-        further = px + change[:, [SHIFT_U, SHIFT_V]]
-        _, left = moved(further)
+        rest = model.local(model.fit(sums, ("gain", MOVED)), (MOVED,))[:, [SHIFT_U, SHIFT_V]]
+        _, left = moved(px + rest)
         closer = model.fit(left, ("gain",))
         if not closer.evidence(fit, 0) > 0.0:
             break
-        px, sums, fit = further, left, closer
+        px, sums, fit = px + rest, left, closer
+    if (np.hypot(*rest.T) < FOLLOWED_PX).all():
+        px = px + rest
     common = common_change(samples, sums.change, sums.square, sums.full)
     return Movement(px, sums, common) if common.share > LEAST_START else None
