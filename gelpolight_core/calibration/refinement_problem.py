@@ -23,6 +23,7 @@ from .refinement_parameters import BUMPS, LED_AXES, ParameterValues
 ModelSurfaces = tuple[Float64Array, Float64Array, NDArray[np.bool_]]
 _STEP = 1e-4
 BLENDED = "contrast"
+"""Of a camera that shows a share of an earlier frame, the untouched membrane, in its presses."""
 STATED = ("radius", "layers", "square", "led_height", "membrane", "response", BLENDED)
 """What is stated or taken for granted, and contradicts the presses if it is wrong: ball radii,
 layers between camera and membrane, squares of the board on the top surface, height of the LEDs, a

@@ -17,7 +17,7 @@ from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, HealthSamples
 
 MOST = 0.6
 """Largest change of the light, as a share, that a linear model still describes."""
-PRESSED = "all_pressed"
+PRESSED, MOVED = "all_pressed", "camera_moved"
 GAINS, OFFSETS = np.arange(0, 6, 2), np.arange(1, 6, 2)
 """Parameters of :class:`HealthSamples` that are gains and room light of the channels."""
 
@@ -122,7 +122,7 @@ def explanations(press: Float64Array | None = None) -> tuple[Explanation, ...]:
     return (
         Explanation("gain", _gain, 0.5),
         Explanation("room_light", _room_light, 0.05),
-        Explanation("camera_moved", _moved, 4.0, most=np.inf),
+        Explanation(MOVED, _moved, 4.0, most=np.inf),
         Explanation("uneven", _uneven, 0.5),
         Explanation("blurred", _blur, 8.0, most=np.inf),
         *pressed,

@@ -19,8 +19,8 @@ from gelpolight_core.image.bad_pixels import FAR_SHARE
 from gelpolight_core.image.grain import COARSEST_STEP, block_grain, level_step
 
 from .background_reference import BackgroundReference
-from .change_fit import ALIKE, FINE, ROWS, ChangeModel, FrameChange, FrameSums
-from .explanations import GAINS, PRESSED
+from .change_fit import ALIKE, FINE, ROWS, ChangeFit, ChangeModel, FrameChange, FrameSums
+from .explanations import GAINS, MOVED, PRESSED
 from .fault_limits import (
     ALONE,
     CLEAR,
@@ -32,7 +32,7 @@ from .fault_limits import (
 )
 from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import BLUR, PARAMETERS, SHIFT_U, SHIFT_V, choose_samples, compare_samples
-from .movement import FOLLOWED_PX, MOVED, Movement, search_movement
+from .movement import FOLLOWED_PX, Movement, search_movement
 from .press_scatter import HealthyPressScatter
 from .press_test import press_effects
 from .robust_fit import CORRELATED
@@ -225,7 +225,7 @@ class FrameEvidence:
         self._has_jumped = False
         self.explained = self._explain(sums)
         if whole and self.explained is not None and not self.explained.is_flicker:
-            self._compare_with_movement(self.explained, sums)
+            self._compare_with_movement(self.explained)
         self.likeness = self._compare_with_membrane()
 
     def _compare_with_membrane(self) -> Likeness:
@@ -237,7 +237,7 @@ class FrameEvidence:
             return Likeness.COVERED
         return Likeness.OVEREXPOSED if self.full_share > MOSTLY_SATURATED else Likeness.NONE
 
-    def _compare_with_movement(self, change: FrameChange, sums: FrameSums) -> None:
+    def _compare_with_movement(self, change: FrameChange) -> None:
         """Take a movement by more than the fit can follow instead of a change of the light.
 
         It is taken if the frame is more likely with its few parameters.
@@ -245,11 +245,10 @@ class FrameEvidence:
         found, model = self._search, self.reference.model
         if found is None or found.size_px <= FOLLOWED_PX:
             return
-        as_it_is = model.fit(sums, ("gain",))
         parameters = sum(model.at[key].size for key in change.fit.keys) - len(GAINS)
         if change.rows is not None:
             parameters += change.rows.shares.size
-        if self._moved_evidence > change.fit.evidence(as_it_is, parameters):
+        if self._moved_evidence > change.fit.evidence(self._as_it_is, parameters):
             self.explained, self.fit, self._has_jumped = None, found.common, True
 
     def _explain(self, sums: FrameSums) -> FrameChange | None:
@@ -421,8 +420,13 @@ class FrameEvidence:
         if self._search is None:
             return -math.inf
         model, usual = self.reference.model, self.reference.usual.evidence
-        before, after = (model.fit(s, ("gain",)) for s in (self._sums, self._search.sums))
-        return after.evidence(before, model.at[MOVED].size) - usual.get(MOVED, 0.0)
+        moved = model.fit(self._search.sums, ("gain",))
+        return moved.evidence(self._as_it_is, model.at[MOVED].size) - usual.get(MOVED, 0.0)
+
+    @cached_property
+    def _as_it_is(self) -> ChangeFit:
+        """The fit of nothing but the gains."""
+        return self.reference.model.fit(self._sums, ("gain",))
 
     @property
     def _may_have_moved(self) -> bool:
@@ -435,10 +439,8 @@ class FrameEvidence:
     def shift_px(self) -> float | None:
         """Size of the movement, None where it is within noise."""
         if self.searched_px is not None:
-            is_sure = (
-                self.likeness is Likeness.NONE or self._moved_evidence > self._rival_of_movement
-            )
-            if is_sure and (self.searched_px > SHIFT_PX or self.likeness is Likeness.NONE):
+            is_likely = self._moved_evidence > self._rival_of_movement
+            if self.likeness is Likeness.NONE or (is_likely and self.searched_px > SHIFT_PX):
                 return self.searched_px
         if self.likeness is not Likeness.MEMBRANE:
             return None

@@ -16,6 +16,7 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.membrane_masks import SATURATED
 
 from .change_fit import ChangeModel, FrameSums
+from .explanations import MOVED
 from .global_change import LEAST_START, GlobalChange, common_change
 from .health_samples import PARAMETERS, RUN, SHIFT_U, SHIFT_V, compare_samples
 
@@ -26,7 +27,6 @@ FOLLOWED_PX = 1.5
 """Largest movement that the fit can follow."""
 STEPS = 8
 """Most steps of the fit; it ends where one makes nothing better."""
-MOVED = "camera_moved"
 
 
 class Movement(NamedTuple):
@@ -96,6 +96,8 @@ def search_movement(model: ChangeModel, raw: NDArray[Any], light: Float32Array) 
         if not closer.evidence(fit, 0) > 0.0:
             break
         px, sums, fit = px + rest, left, closer
+    else:
+        rest = np.zeros_like(px)
     if (np.hypot(*rest.T) < FOLLOWED_PX).all():
         px = px + rest
     common = common_change(samples, sums.change, sums.square, sums.full)
