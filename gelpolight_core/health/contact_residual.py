@@ -122,17 +122,30 @@ class ContactLightResidual:
             return (_doubtful("stretched", text, percent, "%", remedy),)
         worst = max(self.spread, self.uneven)
         if worst > SIGMAS:
-            x_mm, y_mm = self.worst_mm
-            text = (
-                f"the light at ({x_mm:.1f}, {y_mm:.1f}) mm fits no surface: damage or dirt, other "
-                f"light or a movement leaves {worst:.1f} times as much as the calibration's balls"
-            )
-            remedy = (
-                "Clean the membrane and look for damage at this place, hold object and sensor "
-                "still during the exposure, and press again"
-            )
-            return (_doubtful("residual", text, worst, "", remedy),)
+            return (fits_no_surface(worst, self.worst_mm),)
         return ()
+
+
+def fits_no_surface(times: float, place_mm: tuple[float, float]) -> Finding:
+    """Return the finding that the light at a place is that of no surface.
+
+    Parameters
+    ----------
+    times : float
+        What is left, over what the calibration's balls leave.
+    place_mm : (x, y)
+        Where it is largest.
+    """
+    x_mm, y_mm = place_mm
+    text = (
+        f"the light at ({x_mm:.1f}, {y_mm:.1f}) mm fits no surface: damage or dirt, other "
+        f"light or a movement leaves {times:.1f} times as much as the calibration's balls"
+    )
+    remedy = (
+        "Clean the membrane and look for damage at this place, hold object and sensor "
+        "still during the exposure, and press again"
+    )
+    return _doubtful("residual", text, times, "", remedy)
 
 
 def contact_light(

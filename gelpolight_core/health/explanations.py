@@ -87,9 +87,14 @@ def _mixing(samples: HealthSamples) -> Float64Array:
 
 
 def _tone(samples: HealthSamples) -> Float64Array:
-    """Return the effects of a power of the light, and of a parabola."""
+    """Return the effects of a power of the light, and of a parabola.
+
+    A curve changes the texture within a cell by its slope: it acts as a gain and an offset, of
+    which the light of the cell only shows the sum.
+    """
     effects, light = _none(samples, 2), samples.cell_light
-    effects[:, GAINS, 0], effects[:, GAINS, 1] = np.log(light), light
+    effects[:, GAINS, 0], effects[:, OFFSETS, 0] = np.log(light) + 1.0, -light
+    effects[:, GAINS, 1], effects[:, OFFSETS, 1] = 2.0 * light, -(light**2)
     return effects
 
 

@@ -290,6 +290,13 @@ def judge_bad_pixels(frame: FrameEvidence) -> Iterator[Symptom]:
         yield Symptom(100.0 * pixels.share, far=pixels.too_many)
 
 
+def judge_hair(frame: FrameEvidence) -> Iterator[Symptom]:
+    """Judge whether a thin line of pixels does not follow the light."""
+    if frame.bad_pixels.thread is not None:
+        column, row = frame.bad_pixels.thread
+        yield Symptom(facts={"column": column, "row": row})
+
+
 def judge_bad_line(frame: FrameEvidence) -> Iterator[Symptom]:
     """Judge whether lines of pixels do not follow the light, unless most pixels are bad."""
     pixels = frame.bad_pixels
@@ -456,6 +463,15 @@ FAULTS = (
         "Clean the sensor and the lens",
         judge_dirt,
         "mm2",
+    ),
+    Fault(
+        "hair",
+        "a hair or a scratch lies on the membrane, the window or the lens, at column {column} and "
+        "row {row} of the image",
+        "Clean the sensor and the lens, and look for damage",
+        judge_hair,
+        seen_in=SHOWS_PIXELS,
+        hides=("dirt",),
     ),
     Fault(
         "bad_pixels",

@@ -20,7 +20,7 @@ from gelpolight_core.image.grain import COARSEST_STEP, block_grain, level_step
 
 from .background_reference import BackgroundReference
 from .change_fit import ALIKE, FINE, ROWS, ChangeFit, ChangeModel, FrameChange, FrameSums
-from .explanations import GAINS, MOVED, PRESSED
+from .explanations import GAINS, MOVED, OFFSETS, PRESSED
 from .fault_limits import (
     ALONE,
     CLEAR,
@@ -74,12 +74,15 @@ class BadPixelCount:
         Their number.
     columns, rows : tuple of int
         Dead or hot lines.
+    thread : (column, row) or None
+        A place on a chain of other pixels that do not follow the light: a hair, or a scratch.
     """
 
     share: float = 0.0
     count: int = 0
     columns: tuple[int, ...] = ()
     rows: tuple[int, ...] = ()
+    thread: tuple[int, int] | None = None
 
     @property
     def any(self) -> bool:
@@ -324,7 +327,8 @@ class FrameEvidence:
         """Return the largest standard deviation of a cell's light by an explanation."""
         assert self.explained is not None
         fit, model, own = self.explained.fit, self.reference.model, self._at(key)
-        effects = model.effects[:, GAINS][..., model.at[key]]
+        offsets = model.effects[:, OFFSETS] / self.samples.cell_light[..., None]
+        effects = (model.effects[:, GAINS] + offsets)[..., model.at[key]]
         effects = effects - effects.mean(axis=0)
         variance = np.einsum("ckp,pq,ckq->ck", effects, fit.covariance[own, own], effects)
         return math.sqrt(max(float(variance.max(initial=0.0)), 0.0) * ALIKE)

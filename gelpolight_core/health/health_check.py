@@ -14,9 +14,11 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.image.bad_pixels import (
     ACROSS,
     DOWN,
+    BadPixels,
     bad_lines,
     differing_pixels,
     isolated_pixels,
+    threads_of,
 )
 from gelpolight_core.image.coded import LightLevels, coded
 
@@ -84,8 +86,7 @@ class HealthCheck:
             return FrameHealth(unknown=("other_sensor",), untouched=0.0)
         with self._lock:
             raw, light = self._coded(frame)
-            pixels = self._bad_pixels(raw, light, whole)
-            bad = isolated_pixels(raw, light, noise=self._noise) if pixels.any else None
+            pixels, bad = self._bad_pixels(raw, light, whole)
             raw = raw if bad is None else bad.fill_bad_pixels(raw)
             evidence = FrameEvidence(self._reference, raw, light, whole=whole, bad_pixels=pixels)
             return replace(judge_frame(evidence), bad=bad)
@@ -128,18 +129,36 @@ class HealthCheck:
             u, v = found.px.mean(axis=0).tolist()
             return u, v
 
-    def _bad_pixels(self, raw: NDArray[Any], light: Float32Array, whole: bool) -> BadPixelCount:
+    def _bad_pixels(
+        self, raw: NDArray[Any], light: Float32Array, whole: bool
+    ) -> tuple[BadPixelCount, BadPixels | None]:
+        """Return the count of the bad pixels, and all of them if there are any."""
         height = raw.shape[0]
         if min(raw.shape[:2]) < 8:
-            return BadPixelCount()
+            return BadPixelCount(), None
         step = 1 if whole else max(height // STRIPE_ROWS, 1)
         self._stripe = (self._stripe + 1) % step
         rows = np.arange(0 if whole else self._stripe, height, step)
         marks = differing_pixels(raw, light, rows, noise=self._noise)
-        single = int(np.count_nonzero(marks == (ACROSS | DOWN)))
         columns, lines = bad_lines(marks, ACROSS), rows[bad_lines(marks.T, DOWN)]
-        share = single / marks.size
-        return BadPixelCount(share, single, tuple(columns.tolist()), tuple(lines.tolist()))
+        single = marks == (ACROSS | DOWN)
+
+        def count(thread: tuple[int, int] | None = None) -> BadPixelCount:
+            number = int(np.count_nonzero(single))
+            found = tuple(columns.tolist()), tuple(lines.tolist())
+            return BadPixelCount(number / single.size, number, *found, thread)
+
+        pixels = count()
+        if not pixels.any:
+            return pixels, None
+        bad = isolated_pixels(raw, light, noise=self._noise)
+        threads = threads_of(bad, columns, lines)
+        places = np.argwhere(threads)
+        if not places.size:
+            return pixels, bad
+        single &= ~threads[rows]
+        row, column = places[len(places) // 2].tolist()
+        return count((column, row)), bad
 
     def _coded(self, frame: NDArray[Any]) -> tuple[NDArray[Any], Float32Array]:
         """Return a frame as integers, with the linear light of each value."""

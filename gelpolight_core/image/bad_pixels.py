@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +30,12 @@ FAR_SHARE = 0.05
 """Share of bad pixels from which on so many have others beside them that not all are found."""
 ROUNDS = 4
 """With the bad pixels of a round left out, more of those between them are seen."""
+LONGEST = 3
+"""Rows and columns of the largest group of bad pixels of a camera, but for lines."""
+REST = 2
+"""Pixels by which groups are widened before they are joined: not all of a hair differs enough."""
+BY_CHANCE = 1e-3
+"""Expected number of groups by chance below which a group is a thread."""
 REACH = 12
 """Distance to the nearest good pixel above which bad pixels are not single pixels or lines."""
 
@@ -178,6 +185,31 @@ def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
     if not marks.any():
         return np.zeros(0, np.intp)
     return np.flatnonzero(((marks & side) > 0).sum(axis=0) >= LINE_SHARE * len(marks))
+
+
+def threads_of(bad: BadPixels, columns: NDArray[np.intp], rows: NDArray[np.intp]) -> BoolArray:
+    """Return the mask (height, width) of bad pixels that are no fault of a camera.
+
+    Bad pixels lie anywhere. A hair or a scratch is a chain of them that is longer than a group of
+    bad pixels, in both directions, and than chance explains. It may have gaps.
+
+    Parameters
+    ----------
+    bad : BadPixels
+        Of one image.
+    columns, rows : array of int
+        Its bad lines.
+    """
+    mask = bad.mask.copy()
+    mask[:, columns] = False
+    mask[rows, :] = False
+    joined = cv2.dilate(mask.astype(np.uint8), np.ones((1 + 2 * REST, 1 + 2 * REST), np.uint8))
+    groups, labels, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=4)
+    size = np.bincount(labels[mask], minlength=groups)
+    long = np.minimum(stats[:, 2], stats[:, 3]) - 2 * REST > LONGEST
+    around = (1 + 4 * REST) ** 2 - 1
+    by_chance = size.sum() * min(around * mask.mean(), 1.0) ** np.maximum(size - 1.0, 0.0)
+    return np.asarray((long & (by_chance < BY_CHANCE))[labels] & mask)
 
 
 def differing_pixels(

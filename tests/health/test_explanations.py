@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gelpolight_core.health.change_fit import SURE
 from gelpolight_core.health.frame_health import LightGain
+from gelpolight_core.health.health_check import HealthCheck
 from gelpolight_core.health.row_light import RowLight, fit_rows
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import BallIndenter, CylinderIndenter
@@ -88,6 +90,16 @@ def test_a_curve_of_brightness_is_named_and_leaves_the_depth_doubtful(known, sen
     found = sensor.depth(bent, normals=False)
     assert found.health.faults[0].key == "tone"
     assert found.health.meaningless is None
+
+
+def test_a_curve_changes_the_texture_within_a_cell_by_its_slope(known):
+    """So that it is told from room light, which changes dark and bright specks alike."""
+    check = HealthCheck(known.calibration.data)
+    bare = np.clip(known.bare(), 1e-6, 1.0)
+    _, of_curve = check.change(known.noisy(np.asarray(bare ** np.float32(0.97), np.float32)))
+    _, of_room_light = check.change(known.noisy(bare + np.float32(0.01)))
+    assert of_curve["tone"] > of_curve["room_light"] + SURE
+    assert of_room_light["room_light"] > of_room_light["tone"] + SURE
 
 
 def test_nothing_is_found_in_healthy_frames(known, sensor, frame):

@@ -11,6 +11,7 @@ from gelpolight_core.image.bad_pixels import (
     differing_pixels,
     find_bad_pixels,
     no_bad_pixels,
+    threads_of,
 )
 
 HEIGHT, WIDTH = 60, 80
@@ -101,3 +102,29 @@ def test_what_is_left_out_becomes_what_the_neighbours_show(kind):
 def test_places_outside_the_image_are_refused():
     with pytest.raises(ValueError, match="outside"):
         BadPixels(np.array([[60, 3]], np.int32), HEIGHT, WIDTH)
+
+
+def bad_at(*places: tuple[int, int]) -> BadPixels:
+    return BadPixels(np.array(places, np.int32), HEIGHT, WIDTH)
+
+
+NO_LINES = np.zeros(0, np.intp)
+
+
+def test_a_chain_of_pixels_is_a_hair_and_alone_pixels_and_lines_are_not():
+    hair = [(20 + n, 30 + n // 2) for n in range(12)]
+    alone = [(5, 5), (5, 6), (6, 5), (50, 70), (40, 10)]
+    found = threads_of(bad_at(*hair, *alone), NO_LINES, NO_LINES)
+    assert sorted(map(tuple, np.argwhere(found).tolist())) == sorted(hair)
+    column = [(row, 44) for row in range(HEIGHT)]
+    half_of_one = [(row, 12) for row in range(HEIGHT // 3)]
+    lines = bad_at(*column, *half_of_one, *alone)
+    assert not threads_of(lines, np.array([44]), NO_LINES).any()
+
+
+@pytest.mark.parametrize("share", [0.003, 0.03, 0.1])
+def test_many_bad_pixels_form_no_hair_by_chance(share):
+    for seed in range(20):
+        places = np.argwhere(np.random.default_rng(seed).random((HEIGHT, WIDTH)) < share)
+        bad = BadPixels(places.astype(np.int32), HEIGHT, WIDTH)
+        assert not threads_of(bad, NO_LINES, NO_LINES).any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -10,9 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.base.arrays import Float32Array
-from gelpolight_core.base.finding import HeightReliability, Verdict
+from gelpolight_core.base.arrays import BoolArray, Float32Array
+from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.base.row_threads import RowThreadPool
+from gelpolight_core.health.contact_residual import fits_no_surface
+from gelpolight_core.health.fault_limits import SIGMAS
 from gelpolight_core.health.faults import KEYS, health_of
 from gelpolight_core.health.frame_health import FrameHealth, LightGain
 from gelpolight_core.health.health_check import HealthCheck
@@ -102,6 +105,9 @@ def _derivative(model: InPlaceModel, change: Float32Array) -> tuple[Float32Array
 EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
+BLOCK_NODES = 11
+"""Side of the blocks in which the slopes must belong to a surface: errors of the polynomial are
+alike over so many nodes."""
 ONE_MODE = "calibration in place has one mode"
 SCATTERING = (
     *("led_weak", "exposure", "uneven", "rows", "colour_mixing", "tone", "room_light", "blurred"),
@@ -209,7 +215,10 @@ class InPlaceSolver:
             depth,
             normals,
             flags,
-            (free_boundary_note(),) if crossed else (),
+            (
+                *((free_boundary_note(),) if crossed else ()),
+                *self._misfit(slope_x, slope_y, depth, colours.usable),
+            ),
             Trace(request.effort, tuple(record.steps)),
             self._deviations(linear, request, depth, slope_x, slope_y)
             if request.uncertainty
@@ -218,6 +227,40 @@ class InPlaceSolver:
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
         )
+
+    def _misfit(
+        self,
+        slope_x: Float32Array,
+        slope_y: Float32Array,
+        depth_mm: Float32Array,
+        usable_mask: BoolArray,
+    ) -> tuple[Finding, ...]:
+        """Return the finding on slopes that belong to no surface, if some do not.
+
+        The part of a block that belongs to none is compared with the worst that is expected of as
+        many blocks by the errors of presses that were left out. Walls steeper than those of the
+        balls are not judged.
+        """
+        errors, size = self._model.errors, (BLOCK_NODES, BLOCK_NODES)
+        fitted = surface_slopes(depth_mm, self._model.grid.pitch_mm)
+        off_x, off_y = (
+            cv2.blur(slope - surface, size)
+            for slope, surface in zip((slope_x, slope_y), fitted, strict=True)
+        )
+        slope = cv2.blur(cv2.magnitude(*fitted), size)
+        known_mask = usable_mask & (cv2.magnitude(slope_x, slope_y) <= self._model.steepest)
+        whole_mask = cv2.erode(known_mask.astype(np.uint8), np.ones(size, np.uint8)) > 0
+        blocks = np.count_nonzero(known_mask) / BLOCK_NODES**2
+        if blocks < 2.0:
+            return ()
+        sd = np.interp(slope, errors.slopes, errors.slope_sd)
+        share = np.where(whole_mask, cv2.magnitude(off_x, off_y) / sd, 0.0)
+        row, column = np.unravel_index(share.argmax(), share.shape)
+        times = float(share[row, column]) / math.sqrt(2.0 * math.log(blocks))
+        if times <= SIGMAS:
+            return ()
+        grid = self.calibration.table.grid
+        return (fits_no_surface(times, (float(grid.x_mm[column]), float(grid.y_mm[row]))),)
 
     def _normals(self, slope_x: Float32Array, slope_y: Float32Array) -> Float32Array:
         """Return the normals of the membrane with these slopes of its depth."""

@@ -147,3 +147,36 @@ def test_hot_and_dead_pixels_are_named_and_left_out(reconstructor, presses, valu
     clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
     assert found.doubtful_findings
     assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()
+
+
+def at_place(frame: Frame, x_share: float, y_share: float) -> tuple[Map, Map]:
+    """Return the distances (rows, columns) from a place, in widths of the image."""
+    y, x = np.mgrid[: frame.shape[0], : frame.shape[1]] / frame.shape[1]
+    return x - x_share, y - y_share
+
+
+def test_a_hair_is_named_and_left_out(reconstructor, presses):
+    x, y = at_place(presses[0], 0.5, 0.3)
+    on_hair = (np.abs(y - 0.9 * x) < 0.0016) & (np.abs(x) < 0.08)
+    frame = changed(presses[0], np.where(on_hair, 0.2, 1.0)[..., None])
+    (fault,) = reconstructor.health(frame).faults
+    assert fault.key == "hair"
+    clean, found = reconstructor.depth(presses[0]), reconstructor.depth(frame)
+    assert np.abs(found.depth_mm - clean.depth_mm).max() < 0.02 * clean.depth_mm.max()
+
+
+def test_light_that_no_surface_sends_is_found_by_its_slopes(reconstructor, presses):
+    """Slopes of a surface have no rotation; a spot of sunlight has."""
+    for frame in presses[:3]:
+        found = reconstructor.depth(frame, uncertainty=True)
+        assert "residual" not in [finding.key for finding in found.findings]
+        x, y = at_place(frame, 0.6, 0.3)
+        glare = 60.0 * np.exp(-0.5 * (np.hypot(x, y) / 0.06) ** 2)[..., None]
+        lit = np.clip(frame + glare, 0, 255).astype(np.uint8)
+        spoiled = reconstructor.depth(lit, uncertainty=True)
+        (residual,) = [f for f in spoiled.doubtful_findings if f.key == "residual"]
+        assert residual.value > 3.0
+        try:
+            assert measure(spoiled, shape="ball").verdict == "doubtful"
+        except InputError as error:
+            assert residual.text in error.found
