@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.channels import CHANNEL_KEYS
 from gelpolight_core.base.errors import InputError, Remedy
-from gelpolight_core.base.finding import Finding, QualityTable, join_quality_tables, judge
+from gelpolight_core.base.finding import (
+    Finding,
+    QualityTable,
+    Verdict,
+    join_quality_tables,
+    judge,
+)
 from gelpolight_core.base.robust import SD_OF_MEDIAN
 from gelpolight_core.base.safe_reading import escape_undecodable
 from gelpolight_core.calibration.closed_sensor.ball_contact import BallContact
@@ -27,10 +33,12 @@ from gelpolight_core.calibration.closed_sensor.plausibility import judge_kind
 from gelpolight_core.calibration.closed_sensor.preset import stated_sizes
 from gelpolight_core.calibration.closed_sensor.press_light_change import BallImage
 from gelpolight_core.calibration.closed_sensor.slope_calibration import (
+    BACKGROUND_ADVICE,
     LEAST_PRESSES,
     InPlaceResult,
     calibrate_in_place,
 )
+from gelpolight_core.health.global_change import LEAST_START
 from gelpolight_core.image.linear_image import LinearImage, require_size
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL, UNKNOWN, ClosedSensor
 from gelpolight_core.sensor.closed_sensor.working_grid import ImageSize, WorkingGrid
@@ -41,6 +49,7 @@ from gelpolight_core.stages.balls.contact_contour import ImageCircle
 ENOUGH_BALLS = 8
 SETTLED = 0.03
 """Gain of a further ball, relative to the error, below which more balls do not help."""
+MORE_BALLS = "Press more balls at more positions"
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,9 +290,12 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
     widths = np.array([press.diameter_ratio for press in held_out])
     caps, widths = caps[np.isfinite(caps)], widths[np.isfinite(widths)]
     used, refused = len(result.presses), len(result.refused)
-    more = "Press more balls at more positions"
-    sizes = Remedy.CHECK_SIZES
-    grid = result.model.grid
+    grid, kind = result.model.grid, judge_kind(result)
+    helps = (
+        Remedy.CHECK_SIZES
+        if any(f.verdict is not Verdict.PASS for f in kind)
+        else what_would_help(result)
+    )
     scale = judge_scale(grid.pixel_mm.tolist(), result.model.scale_sd, grid.lens).figures
     return {
         "scale": QualityTable((*scale, *judge_stretch(result.stretch, grid))),
@@ -295,7 +307,16 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     float(used),
                     warn=float(ENOUGH_BALLS),
                     higher_is_better=True,
-                    remedy=more,
+                    remedy=MORE_BALLS,
+                ),
+                judge(
+                    "background_share_percent",
+                    "Membrane around the balls that looks like the background",
+                    100.0 * result.as_background,
+                    "%",
+                    warn=100.0 * LEAST_START,
+                    higher_is_better=True,
+                    remedy=BACKGROUND_ADVICE,
                 ),
                 judge(
                     "balls_left_out_percent",
@@ -312,7 +333,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     float(np.degrees(np.arctan(result.model.steepest))),
                     "deg",
                 ),
-                *judge_kind(result),
+                *kind,
             )
         ),
         "in_place": QualityTable(
@@ -324,7 +345,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     "deg",
                     warn=5.0,
                     fail=12.0,
-                    remedy=more,
+                    remedy=helps,
                 ),
                 judge(
                     "held_out_cap_percent",
@@ -333,7 +354,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     "%",
                     warn=8.0,
                     fail=25.0,
-                    remedy=sizes,
+                    remedy=helps,
                 ),
                 judge(
                     "held_out_diameter_percent",
@@ -342,15 +363,32 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     "%",
                     warn=3.0,
                     fail=15.0,
-                    remedy=sizes,
+                    remedy=helps,
                 ),
-                *_learning_figures(result, more),
+                *_learning_figures(result),
             )
         ),
     }
 
 
-def _learning_figures(result: InPlaceResult, more: str) -> tuple[Finding, ...]:
+def what_would_help(result: InPlaceResult) -> str:
+    """Return what would make the errors of presses left out smaller, as a sentence.
+
+    A wrong size of all balls changes slopes and balls alike: it does not show in these errors.
+    """
+    if not result.is_of_background:
+        return BACKGROUND_ADVICE
+    gain = expected_error_reduction(result)
+    if gain is None or gain > SETTLED or len(result.presses) < ENOUGH_BALLS:
+        return MORE_BALLS
+    if result.has_markers:
+        return "More balls do not help: markers hide the slope; larger balls hide less of it"
+    if len({press.ball.radius for press in result.presses}) == 1:
+        return "More balls of this size do not help: press balls of another size, too"
+    return "More balls do not help: this is what the sensor gives, and measurements state it"
+
+
+def _learning_figures(result: InPlaceResult) -> tuple[Finding, ...]:
     """Return the expected improvement by one more ball, from fits with fewer balls."""
     gain = expected_error_reduction(result)
     if gain is None:
@@ -362,7 +400,7 @@ def _learning_figures(result: InPlaceResult, more: str) -> tuple[Finding, ...]:
             100.0 * gain,
             "%",
             warn=100.0 * SETTLED,
-            remedy=more,
+            remedy=MORE_BALLS,
         ),
     )
 

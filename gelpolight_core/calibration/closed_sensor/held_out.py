@@ -139,6 +139,21 @@ def held_out_slope_ratios(
     return np.array(list(in_parallel(share, list(zip(colours, balls, coefficients, strict=True)))))
 
 
+def explained_share(presses: Sequence[HeldOutPress]) -> float:
+    """Return the share of the squared slopes of presses left out that was found, below 0 for none.
+
+    Parameters
+    ----------
+    presses : sequence of HeldOutPress
+        Each left out in its turn.
+    """
+    error, slope = (
+        np.concatenate([getattr(press, name) for press in presses]) for name in ("error", "slope")
+    )
+    # An error is that of one of two components.
+    return float(1.0 - 2.0 * (error**2).sum() / max((slope**2).sum(), 1e-12))
+
+
 def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCurve:
     """Return the errors of slopes and depths of presses left out.
 

@@ -20,6 +20,7 @@ from scipy import ndimage
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.parallel import in_parallel
+from gelpolight_core.health.global_change import LEAST_START
 from gelpolight_core.health.press_scatter import changes_of
 from gelpolight_core.sensor.closed_sensor.colour_change import (
     SMOOTHING_NODES,
@@ -46,8 +47,20 @@ from .ball_contact import (
     refine_centre_by_slopes,
 )
 from .contact_aspect import ContactAspect, stretch_of
-from .held_out import HeldOutPress, error_curve, held_out_press, held_out_slope_ratios
-from .press_light_change import BallImage, PressLights, press_lights, refuse_dead_channel
+from .held_out import (
+    HeldOutPress,
+    error_curve,
+    explained_share,
+    held_out_press,
+    held_out_slope_ratios,
+)
+from .press_light_change import (
+    BallImage,
+    PressLights,
+    press_lights,
+    refuse_dead_channel,
+    share_as_background,
+)
 from .ridge_fit import (
     INSIDE,
     PressNormalEquations,
@@ -70,6 +83,10 @@ OUTLIER = 3.0
 """A press is left out if its error is this multiple of the median ..."""
 LEAST_OUTLIER = 0.12
 """... and above this root mean square slope."""
+LEARNT = 0.5
+"""Share of the squared slopes of presses left out that a background must explain if the membrane
+around the balls does not look like it."""
+BACKGROUND_ADVICE = "Use a background of the same gel, crop, size and exposure as the ball images"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +132,10 @@ class InPlaceResult:
     sizes : tuple of (float, float, float)
         Radius of each size of ball, mm, the ratio of its slopes by the presses of all other sizes
         to the true ones, and its standard deviation. Empty if all balls are alike.
+    as_background : float
+        Share of the membrane around the balls that looks like the background, median.
+    has_markers : bool
+        Whether the membrane has markers.
     """
 
     model: InPlaceModel
@@ -124,6 +145,13 @@ class InPlaceResult:
     next_position_mm: tuple[float, float] = (0.0, 0.0)
     stretch: ContactAspect | None = None
     sizes: tuple[tuple[float, float, float], ...] = ()
+    as_background: float = 1.0
+    has_markers: bool = False
+
+    @property
+    def is_of_background(self) -> bool:
+        """Whether the membrane around the balls looks like the background."""
+        return self.as_background >= LEAST_START
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +198,8 @@ def calibrate_in_place(
     Raises
     ------
     InputError
-        If fewer than 3 images show a ball that agrees with the others, or the background is of
-        another gel, crop or sensor.
+        If fewer than 3 images show a ball that agrees with the others, or a background of another
+        gel, crop or sensor explains too little of the slopes of presses that are left out.
     """
     reduced = grid.reduce(background)
     bare = make_reference_image(reduced)
@@ -196,6 +224,9 @@ def calibrate_in_place(
     share = float(np.median(held_out_slope_ratios(colours, balls, without)))
     items = zip(colours, balls, [c / share for c in without], strict=True)
     held_out = tuple(in_parallel(lambda item: held_out_press(*item), items))
+    as_background = share_as_background(lights)
+    if as_background < LEAST_START and explained_share(held_out) < LEARNT:
+        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
     model = InPlaceModel(
         grid,
         reduced,
@@ -216,6 +247,8 @@ def calibrate_in_place(
         next_position(balls, grid, bare.known),
         stretch,
         _sizes(contacts, sums, lambda rest: solve_ridge(rest, ridge) / share, grid),
+        as_background,
+        bool(bare.markers),
     )
 
 
@@ -294,8 +327,15 @@ def _begin(
                 refused[press.name] = contact
             else:
                 contacts.append(contact)
+    as_background = share_as_background(lights)
+    if len(contacts) < LEAST_PRESSES and as_background < LEAST_START:
+        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
     _require_presses(contacts, refused)
     return contacts, refused
+
+
+def _not_the_background(share: float) -> str:
+    return f"the background looks like {100.0 * share:.0f} % of the membrane around the balls"
 
 
 def _require_presses(

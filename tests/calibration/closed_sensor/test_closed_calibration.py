@@ -11,9 +11,16 @@ from gelpolight_core import measure
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
+from gelpolight_core.calibration.closed_sensor.held_out import explained_share
+from gelpolight_core.calibration.closed_sensor.slope_calibration import (
+    BACKGROUND_ADVICE,
+    InPlaceResult,
+)
 from gelpolight_core.calibration.closed_sensor_recipe import BALLS, recipe_with_prior
 from gelpolight_core.calibration.closed_sensor_stages import (
+    MORE_BALLS,
     expected_error_reduction,
+    what_would_help,
     with_background,
 )
 from gelpolight_core.calibration.manifest import read_summary
@@ -157,8 +164,68 @@ def test_a_wrong_background_is_refused(closed_folder, tmp_path):
         part = image[30:-10, 40:-10]
         assert cv2.imwrite(str(path), cv2.resize(part, image.shape[1::-1]))
     session = read_session(folder)
-    with pytest.raises(InputError, match="the background looks like"):
+    with pytest.raises(InputError) as refused:
         run_calibration(session)
+    assert refused.value.advice == BACKGROUND_ADVICE
+
+
+def test_balls_under_another_light_each_are_used(closed_folder, closed_run, tmp_path):
+    """As by a camera that balances its white by itself."""
+    folder = tmp_path / "session"
+    shutil.copytree(closed_folder, folder)
+    random = np.random.default_rng(3)
+    for path in sorted((folder / "balls").iterdir()):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        lit = np.rint(image * random.uniform(0.8, 1.0, 3)).astype(image.dtype)
+        assert cv2.imwrite(str(path), lit)
+    run = run_calibration(read_session(folder))
+    usual = closed_run.results[BALLS].result
+    found = run.results[BALLS].result
+    assert len(found.presses) == len(usual.presses)
+
+    def degrees(result: InPlaceResult) -> float:
+        return float(np.mean([press.held_out.normal_deg for press in result.presses]))
+
+    assert degrees(found) < degrees(usual) + 0.5
+
+
+def with_presses(result: InPlaceResult, count: int, radii: tuple[float, ...]) -> InPlaceResult:
+    """Return a result with so many presses of balls of these radii, nodes."""
+    first = result.presses[0]
+    presses = tuple(
+        replace(first, ball=replace(first.ball, radius=radii[i % len(radii)])) for i in range(count)
+    )
+    return replace(result, presses=presses, as_background=0.7, has_markers=False)
+
+
+FALLS, SETTLED = ((5, 0.2), (8, 0.1)), ((24, 0.1), (32, 0.1))
+
+
+def test_the_remedy_is_what_would_make_the_errors_smaller(closed_run):
+    result = closed_run.results[BALLS].result
+    alike = replace(with_presses(result, 40, (30.0,)), learning=SETTLED)
+    mixed = replace(with_presses(result, 40, (30.0, 40.0)), learning=SETTLED)
+    cases = {
+        "more": replace(mixed, learning=FALLS),
+        "few": replace(with_presses(result, 4, (30.0, 40.0)), learning=SETTLED),
+        "background": replace(mixed, as_background=0.1),
+        "markers": replace(mixed, has_markers=True),
+        "one size": alike,
+        "nothing": mixed,
+    }
+    said = {name: what_would_help(case) for name, case in cases.items()}
+    assert said["more"] == said["few"] == MORE_BALLS
+    assert said["background"] == BACKGROUND_ADVICE
+    assert len(set(said.values())) == 5
+    assert "markers" in said["markers"] and "size" in said["one size"]
+
+
+@pytest.mark.parametrize(("error", "share"), [(0.0, 1.0), (0.1, 0.5), (0.2, -1.0)])
+def test_the_explained_share_is_that_of_the_squared_slopes(closed_run, error, share):
+    press = closed_run.results[BALLS].result.presses[0].held_out
+    slopes, errors = np.full(9, 0.2), np.full(9, error)
+    found = explained_share([replace(press, slope=slopes, error=errors)])
+    assert found == pytest.approx(share)
 
 
 def test_a_set_without_any_ball_is_refused(closed_folder, tmp_path):
