@@ -251,9 +251,14 @@ class _SlopeProblem:
         return used
 
     def _ends(self, places: WallPlaces) -> Float64Array:
-        """Return distances from the wall between which the slopes of a profile are."""
-        step_mm = self.smoothing.step_mm
-        return np.arange(-INSIDE_MM, float(places.beyond_mm.max()) + 3.0 * step_mm, step_mm)
+        """Return distances from the wall between which the slopes of a profile are.
+
+        A wall that is tried far away from all nodes has no slope there.
+        """
+        step_mm, nodes = self.smoothing.step_mm, self.nodes
+        most_mm = 2.0 * math.hypot(np.ptp(nodes.x_mm), np.ptp(nodes.y_mm))
+        end_mm = min(float(places.beyond_mm.max()), most_mm)
+        return np.arange(-INSIDE_MM, end_mm + 3.0 * step_mm, step_mm)
 
     def _profile(self, values: Mapping[str, float], places: WallPlaces) -> Float64Array:
         """Return the map's slopes along lines across the wall."""
@@ -484,6 +489,8 @@ def _variance(found: _Round) -> Float64Array:
     calm = used & (bend2 <= np.median(bend2[used]))
     steep = used & (bend2 >= max(float(np.quantile(bend2[used], STEEP)), 1e-9))
     level = SQUARES * float(np.median(squares[calm])) + 1e-12
+    if not steep.any():
+        return np.full_like(squares, level)  # no node is at a wall
     more = squares[steep].mean() - level
     return level + max(float(more / bend2[steep].mean()), 0.0) * bend2
 
@@ -508,7 +515,8 @@ def _along_wall(problem: _SlopeProblem, found: _Round, gain: Float64Array) -> Fl
     """
     node_mm, by = problem.smoothing.node_mm, found.derivatives
     use = found.weight > 0.0
-    at = np.round((by.beyond_mm[use] - by.beyond_mm[use].min()) / node_mm).astype(np.intp)
+    from_first_mm = by.beyond_mm[use] - by.beyond_mm[use].min()
+    at = np.unique(np.round(from_first_mm / node_mm), return_inverse=True)[1]
     weight, normal = found.weight[use], np.sum(found.residual * by.outwards, axis=0)[use]
     counts, total = np.bincount(at), np.bincount(at, weight)
     seen = counts >= LEAST_SEEN
@@ -517,7 +525,8 @@ def _along_wall(problem: _SlopeProblem, found: _Round, gain: Float64Array) -> Fl
     bend2 = np.bincount(at, weight * by.bend[use] ** 2) / total
     edge = seen & (bend2 > (1.0 - STEEP) * bend2[seen].max())
     free = max(int(edge.sum()) - AT_EDGE, 1) / max(int(edge.sum()), 1)
-    place_mm2 = max(float(mean2[edge].sum() / bend2[edge].sum()), 0.0) / free
+    bends2 = float(bend2[edge].sum())
+    place_mm2 = max(float(mean2[edge].sum()) / bends2, 0.0) / free if bends2 else 0.0
     error2 = np.where(edge, place_mm2 * bend2, np.where(seen, np.maximum(mean2, 0.0), 0.0))
     each = np.einsum("pan,an->pn", gain[..., use], by.outwards[:, use])
     common = np.stack([np.bincount(at, row, minlength=counts.size) for row in each])

@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter
 
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.lab.reference_press import read_truth
+from gelpolight_core.measurement import indenter_fit
 from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
 from gelpolight_core.measurement.object_measurement import measure_object
 from gelpolight_core.session.reference_object import ReferenceObject
@@ -221,3 +222,21 @@ def test_true_depth_maps_give_the_true_sizes(shared_data):
 def test_an_edge_radius_that_cannot_be_is_refused(shape, radius_mm):
     with pytest.raises(InputError, match="edge radius"):
         measure_object(on_grid(pressed(shape), X, Y), shape=shape, edge_radius_mm=radius_mm)
+
+
+@pytest.mark.parametrize("shape", ["ball", "cylinder", "cuboid"])
+def test_a_step_far_beyond_the_map_is_tried_and_rejected(shape, monkeypatch):
+    """On a torn gel, a fit tried walls kilometres away: their profile was larger than memory."""
+    surface = on_grid(pressed(shape), X, Y)
+    usual = measure_object(surface, shape=shape)
+    fit, tried = indenter_fit.fit_least_squares, []
+
+    def with_far_step(residuals, slopes, start, bounds, **options):
+        far = np.asarray(start).copy()
+        far[0] += 1e7
+        tried.append(np.isfinite(residuals(far)).all())
+        return fit(residuals, slopes, start, bounds, **options)
+
+    monkeypatch.setattr(indenter_fit, "fit_least_squares", with_far_step)
+    assert measure_object(surface, shape=shape).size_mm == usual.size_mm
+    assert tried and all(tried)
