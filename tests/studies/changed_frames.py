@@ -317,7 +317,7 @@ def cases() -> Iterable[ChangedFrame]:
             curved,
         ),
         ChangedFrame("tone-curve", plain(tone(0.08)), curved),
-        ChangedFrame("tone-mapping", plain(tone_mapped), f"{curved}|uneven"),
+        ChangedFrame("tone-mapping", plain(tone_mapped), f"{curved}|uneven|{PROCESSED}"),
         ChangedFrame(
             "sharpened", plain(lambda i: i + 0.7 * (i - smooth(i, 1.2))), f"{PROCESSED}|sharpen"
         ),
