@@ -110,6 +110,10 @@ class Remedy(StrEnum):
     PLACE_POINTS = "Place the points further apart, and not on one line"
     # Cameras and other sources
     PLUG_IN = "Plug it in at the same port"
+    OTHER_BUS = (
+        "Plug one of the cameras into a port of another USB bus, or choose a smaller image or a "
+        "lower frame rate"
+    )
     CHECK_CABLE = "Check its cable, then open it again"
     WAIT = "Wait until it responds again, or check its cable"
     NO_SUCH_SETTING = "Set it in the camera manufacturer's program, or leave it unchanged"

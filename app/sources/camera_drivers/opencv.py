@@ -137,6 +137,10 @@ class OpenCvProperties:
     def close(self) -> None:
         """Do nothing: no resources are held here."""
 
+    def lacks_bandwidth(self) -> bool:
+        """Return False: these systems do not say why a camera sends no images."""
+        return False
+
     def controls(self) -> tuple[SourceSetting, ...]:
         """Return the settings that the camera supports."""
         settings = []
@@ -252,6 +256,7 @@ class OpenCvCamera:
         self, device: CameraDevice, capture: Any, controls: V4l2Device | OpenCvProperties
     ) -> None:
         self._device, self._capture, self._controls = device, capture, controls
+        self._has_sent = False
 
     @property
     def format(self) -> CameraFormat:
@@ -275,10 +280,23 @@ class OpenCvCamera:
             return None
         good, bgr = self._capture.retrieve() if good else (False, None)
         if not good or bgr is None or not bgr.size:
-            raise CameraDisconnected(
-                "the camera delivers no more images", self._device.name, Remedy.CHECK_CABLE
-            )
+            raise self._no_image()
+        self._has_sent = True
         return _rgb(bgr), came_s
+
+    def _no_image(self) -> CameraDisconnected:
+        """Return why there is no image."""
+        if not self._has_sent:
+            self._capture.release()  # only one can start it
+            if self._controls.lacks_bandwidth():
+                return CameraDisconnected(
+                    "the USB bus has no room left for its images: other cameras use it",
+                    self._device.name,
+                    Remedy.OTHER_BUS,
+                )
+        return CameraDisconnected(
+            "the camera delivers no more images", self._device.name, Remedy.CHECK_CABLE
+        )
 
     def controls(self) -> tuple[SourceSetting, ...]:
         """Return the settings."""

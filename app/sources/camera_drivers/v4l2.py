@@ -25,8 +25,12 @@ VIDIOC_QUERYCTRL = 0xC0445624
 VIDIOC_QUERYMENU = 0xC02C5625
 VIDIOC_ENUM_FRAMESIZES = 0xC02C564A
 VIDIOC_ENUM_FRAMEINTERVALS = 0xC034564B
+VIDIOC_REQBUFS = 0xC0145608
+VIDIOC_STREAMON = 0x40045612
+VIDIOC_STREAMOFF = 0x40045613
 
 CAPTURE = 1
+MAPPED = 1
 DISCRETE = 1
 DISABLED, GRABBED, READ_ONLY, INACTIVE = 0x1, 0x2, 0x4, 0x10
 
@@ -93,6 +97,12 @@ class ControlValue(ctypes.Structure):
     """``struct v4l2_control``."""
 
     _fields_ = (("id", ctypes.c_uint32), ("value", ctypes.c_int32))
+
+
+class RequestedBuffers(ctypes.Structure):
+    """``struct v4l2_requestbuffers``."""
+
+    _fields_ = _words("count", "type", "memory", "capabilities", "flags")
 
 
 Ioctl = Callable[[int, int, Any], Any]
@@ -289,6 +299,21 @@ class V4l2Device:
                 continue
             return number
         return EXPOSURE_APERTURE
+
+    def lacks_bandwidth(self) -> bool:
+        """Return whether the USB bus has no room left for the camera's images.
+
+        A capture that has the camera open must be released before.
+        """
+        kind = ctypes.c_int(CAPTURE)
+        try:
+            self._ioctl(self._file, VIDIOC_REQBUFS, RequestedBuffers(1, CAPTURE, MAPPED))
+            self._ioctl(self._file, VIDIOC_STREAMON, kind)
+            self._ioctl(self._file, VIDIOC_STREAMOFF, kind)
+            self._ioctl(self._file, VIDIOC_REQBUFS, RequestedBuffers(0, CAPTURE, MAPPED))
+        except OSError as error:
+            return error.errno == errno.ENOSPC
+        return False
 
     # The kernel
 

@@ -17,7 +17,7 @@ from app.sources.camera_drivers.opencv import OpenCvDriver
 from app.sources.camera_drivers.shared_camera import SharedCamera
 from app.sources.source import SourceFrame
 from app.sources.stream import Stream
-from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.errors import InputError, Remedy
 
 SIZE = (64, 48)
 
@@ -149,3 +149,29 @@ def test_cameras_are_identified_by_their_identity_not_their_number(monkeypatch, 
     monkeypatch.setattr(opencv, "LINUX", False)
     (device,) = OpenCvDriver(interface=cv2.CAP_DSHOW).devices()
     assert device.address == "3"
+
+
+@pytest.mark.function("Learn that two cameras need more than their USB bus has")
+@pytest.mark.parametrize("sent", [0, 1])
+def test_a_second_camera_on_a_full_bus_is_told_from_a_broken_cable(monkeypatch, sent):
+    class FullBus:
+        path = "/dev/video2"
+
+        def lacks_bandwidth(self) -> bool:
+            assert not capture.values  # the capture was released
+            return True
+
+        def close(self) -> None:
+            pass
+
+    capture = Capture(0, 0)
+    grey = np.full((4, 6), 3, np.uint8)
+    capture.answers = [(0.0, grey)] * sent + [(0.0, None)]
+    device = CameraDevice("a", "camera", "", "0")
+    camera = opencv.OpenCvCamera(device, capture, FullBus())  # type: ignore[arg-type]
+    for _ in range(sent):
+        assert camera.read() is not None
+    with pytest.raises(CameraDisconnected) as lost:
+        camera.read()
+    expected = Remedy.CHECK_CABLE if sent else Remedy.OTHER_BUS
+    assert lost.value.advice == expected.format()

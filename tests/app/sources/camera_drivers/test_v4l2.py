@@ -36,6 +36,9 @@ class Kernel:
         }
         self.sizes = {"YUYV": [(640, 480), (1280, 960)], "MJPG": [(1280, 960)]}
         self.error = 0
+        self.start_error = 0
+        self.buffers = 0
+        self.is_on = False
         self.asked: list[tuple[int, int]] = []
 
     def __call__(self, _file: int, request: int, argument: Any) -> int:
@@ -49,8 +52,25 @@ class Kernel:
             v4l2.VIDIOC_QUERYMENU: self._menu,
             v4l2.VIDIOC_G_CTRL: self._get,
             v4l2.VIDIOC_S_CTRL: self._set,
+            v4l2.VIDIOC_REQBUFS: self._request_buffers,
+            v4l2.VIDIOC_STREAMON: self._start,
+            v4l2.VIDIOC_STREAMOFF: self._stop,
         }[request](argument)
         return 0
+
+    def _request_buffers(self, a: Any) -> None:
+        assert (a.type, a.memory, self.is_on) == (1, 1, False)
+        self.buffers = a.count
+
+    def _start(self, kind: Any) -> None:
+        assert kind.value == 1 and self.buffers
+        if self.start_error:
+            raise OSError(self.start_error, "cannot start")
+        self.is_on = True
+
+    def _stop(self, kind: Any) -> None:
+        assert kind.value == 1
+        self.is_on = False
 
     def _format(self, a: Any) -> None:
         assert a.type == 1
@@ -122,6 +142,9 @@ def test_the_requests_match_the_kernel_header():
         (v4l2.VIDIOC_QUERYMENU, v4l2.QueryMenu),
         (v4l2.VIDIOC_G_CTRL, v4l2.ControlValue),
         (v4l2.VIDIOC_S_CTRL, v4l2.ControlValue),
+        (v4l2.VIDIOC_REQBUFS, v4l2.RequestedBuffers),
+        (v4l2.VIDIOC_STREAMON, ctypes.c_int),
+        (v4l2.VIDIOC_STREAMOFF, ctypes.c_int),
     ):
         assert (request >> 16) & 0x3FFF == ctypes.sizeof(structure), structure.__name__
 
@@ -184,3 +207,11 @@ def test_an_unplugged_camera_raises_camera_gone(camera, kernel):
         (errno.ENOENT, "not found"), (errno.EBUSY, "another program"), (errno.EACCES, '"video"'),
     ):  # fmt: skip
         assert words in str(v4l2.disconnected_error("/dev/video9", OSError(number, "no")))
+
+
+@pytest.mark.parametrize(("error", "lacks"), [(0, False), (errno.ENOSPC, True), (errno.EIO, False)])
+def test_a_bus_without_room_for_the_images_is_told_by_starting_them(camera, kernel, error, lacks):
+    kernel.start_error = error
+    assert camera.lacks_bandwidth() == lacks
+    assert not kernel.is_on
+    assert error or not kernel.buffers
