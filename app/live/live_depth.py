@@ -132,6 +132,8 @@ class LiveDepth(QObject):
             case "same_camera" if (info := self._context.source.info) is not None:
                 self._context.cameras.accept_same(self._camera_used, info.detail)
                 self.update()
+            case "image_size" if (used := self.state.used) is not None:
+                self._context.cameras.choose_size(self._context.source.info, used.size)
             case "reopen":
                 self.live.open()
 
@@ -172,6 +174,7 @@ class LiveDepth(QObject):
             kind="" if info is None else info.kind,
             serial=self.live.serial,
             size=self._size,
+            offered=self._context.cameras.sizes(info),
             used=used,
             other_camera=other_camera,
             calibrations=tuple(target for _entry, target in self.calibrations.candidates()),

@@ -15,12 +15,13 @@ BUTTONS = {
     "sensors": "Choose or calibrate a sensor",
     "fitting": "Use a matching calibration",
     "same_camera": "It is the same camera",
+    "image_size": "Set the camera to this size",
     "reopen": "Reconnect",
     "zero": "Set to zero",
     "live": "Back to the camera",
 }
 """The text of the button of every action. An advice with such a key has a button."""
-OF_CALIBRATION = ("fitting", "calibrate", "sensors", "same_camera")
+OF_CALIBRATION = ("fitting", "calibrate", "sensors", "same_camera", "image_size")
 """Actions that help where the calibration in use is not for the images."""
 PREPARING = Finding("preparing", "Preparing the calibration. Please wait.")
 
@@ -49,6 +50,8 @@ class LiveState:
         Serial of the sensor of the source. Empty if unknown.
     size : (width, height) or None
         Image size. None before the first image.
+    offered : tuple of (width, height)
+        Image sizes that the camera offers.
     used : CalibrationTarget or None
         The calibration in use.
     other_camera : str
@@ -66,6 +69,7 @@ class LiveState:
     kind: str = ""
     serial: str = ""
     size: Size | None = None
+    offered: tuple[Size, ...] = ()
     used: CalibrationTarget | None = None
     other_camera: str = ""
     calibrations: tuple[CalibrationTarget, ...] = ()
@@ -116,7 +120,9 @@ def advise(now: LiveState) -> Finding | None:
         assert now.size is not None
         size, expected = ("x".join(map(str, size)) for size in (now.size, now.used.size))
         text = f"The images are {size} pixels, but the calibration in use is for {expected} pixels."
-        return Finding(_way_to_fitting(now), text, verdict=Verdict.FAIL)
+        can_be_set = now.used.size in now.offered and not now.other_camera
+        key = "image_size" if can_be_set else _way_to_fitting(now)
+        return Finding(key, text, verdict=Verdict.FAIL)
     if now.other_camera:
         key = "fitting" if _fits(now) else "same_camera"
         return Finding(key, now.other_camera, verdict=Verdict.FAIL)

@@ -16,6 +16,7 @@ from app.sources.camera_drivers.driver import (
     CameraDevice,
     CameraDriver,
     CameraFormat,
+    best_format,
     compression_warning,
     has_placeholder,
     without_port,
@@ -195,6 +196,20 @@ class CameraManager(QObject):
         """Use another image format, now and whenever the camera is opened."""
         now, size = camera.requested_settings or camera.settings_now(), (new.width, new.height)
         self._want(camera, replace(now, pixel_format=new.code, size=size, rate_hz=new.rate_hz))
+
+    def sizes(self, info: SourceInfo | None) -> tuple[tuple[int, int], ...]:
+        """Return the image sizes that the camera of a source offers."""
+        camera = self.of(info)
+        offered = () if camera is None else camera.state.offered
+        return tuple(dict.fromkeys((f.width, f.height) for f in offered))
+
+    def choose_size(self, info: SourceInfo | None, size: tuple[int, int]) -> None:
+        """Use the best format of an image size, if the camera of a source has one."""
+        camera = self.of(info)
+        offered = () if camera is None else camera.state.offered
+        best = best_format(tuple(f for f in offered if (f.width, f.height) == size))
+        if camera is not None and best is not None:
+            self.choose_format(camera, best)
 
     def restore_reference(self, camera: SharedCamera) -> None:
         """Set a camera as it was for the calibration or session."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_camera import C310, FakeCamera, FakeDriver
+from fake_camera import C310, FakeCamera, FakeDriver, eventually
 from PySide6.QtWidgets import QWidget
 
 from app.live.live_depth import LiveDepth
@@ -62,7 +62,7 @@ def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth):
     depth.load(reconstructor, reconstructor)
     assert loaded == [reconstructor]
     assert depth.live_reconstructor is None, "no camera is selected"
-    depth._context.source.choose(SimpleNamespace(kind="camera", name="A"))  # type: ignore[arg-type]
+    depth._context.source.choose(SimpleNamespace(kind="camera", name="A", detail=""))  # type: ignore[arg-type]
     depth.choose(reconstructor, reconstructor)
     assert depth.live_reconstructor is reconstructor
     large = SourceFrame(np.zeros((8, 6, 3), np.uint8), 0, 0.0)
@@ -101,3 +101,30 @@ def test_a_calibration_of_another_camera_is_used_only_if_the_user_says_that_it_i
     depth.act(action_of(advice))
     assert depth.live_reconstructor is reconstructor
     assert action_of(advise(depth.state)) != "same_camera"
+
+
+@pytest.mark.function("Set a camera back to the calibration's image size with one button")
+def test_a_camera_with_another_image_size_is_set_to_that_of_the_calibration(depth, qtbot):
+    context, camera = depth._context, FakeCamera()
+    context.cameras.driver = FakeDriver(camera)
+    (info,) = context.cameras.infos()
+    context.source.choose(info)
+    calibration = SimpleNamespace(camera=SimpleNamespace(width=128, height=96), serial="A")
+    calibration.provenance = SimpleNamespace(camera_settings={})
+    reconstructor: Any = SimpleNamespace(calibration=calibration)
+    depth.choose(reconstructor, reconstructor)
+    shared = context.cameras.of(info)
+    small = next(f for f in camera.formats if (f.width, f.height) == (64, 48))
+    context.cameras.choose_format(shared, small)
+    stream_reader = list[SourceFrame]().append
+    shared.attach(stream_reader)
+    try:
+        eventually(lambda: shared.state.format == small)
+        depth.live.processed.emit(Done(SourceFrame(np.zeros((48, 64, 3), np.uint8), 0, 0.0), None))
+        advice = advise(depth.state)
+        assert action_of(advice) == "image_size" and "128x96" in advice.text
+        depth.act("image_size")
+        eventually(lambda: (shared.state.format.width, shared.state.format.height) == (128, 96))
+        assert not shared.state.format.compressed
+    finally:
+        shared.detach(stream_reader)

@@ -25,6 +25,23 @@ OFF = Finding("led_off", "the red LED is off", remedy="Check it", verdict=Verdic
             False,
         ),
         (LiveState("folder", size=(640, 480), used=MINE), "sensors", False),
+        (
+            LiveState("camera", size=(640, 480), offered=((640, 480), MINE.size), used=MINE),
+            "image_size",
+            False,
+        ),
+        (
+            LiveState(
+                "camera",
+                size=(6, 4),
+                offered=(MINE.size,),
+                used=MINE,
+                other_camera="It is another.",
+            ),
+            "sensors",
+            False,
+        ),
+        (LiveState("camera", size=(640, 480), offered=((640, 480),), used=MINE), "sensors", False),
         (LiveState("folder", size=MINE.size, used=MINE, trouble="it broke"), "reopen", True),
         (LiveState("folder", size=MINE.size, used=MINE, fault=DIM), "zero", True),
     ],
