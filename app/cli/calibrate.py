@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.base.atomic_write import write_json
+from gelpolight_core.base.atomic_write import write_atomically, write_json
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.number import read_number
 from gelpolight_core.base.user_name import user_name
@@ -20,6 +21,7 @@ from gelpolight_core.calibration.closed_sensor_recipe import recipe_with_prior
 from gelpolight_core.calibration.closed_sensor_stages import with_background
 from gelpolight_core.calibration.project import CalibrationRun, run_calibration
 from gelpolight_core.calibration.recipes import recipe_named, recipe_of, session_to_calibrate
+from gelpolight_core.output.normal_table import write_normal_table
 from gelpolight_core.reconstruction.background_shift import background_shift, with_zero
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.session.session import read_session
@@ -146,6 +148,20 @@ class DriftCommand(Command):
             )
             write_calibration(changed, self.zero)
             print_safe(f"{changed.identity} saved to {self.zero}")
+
+
+@dataclass(frozen=True)
+class ExportNormalsCommand(Command):
+    """A closed sensor's calibration as a table for programs that look normals up by colour."""
+
+    calibration: Path = positional("CALIBRATION")
+    output: Path = output("TABLE", "the table, .npz: normals by change of colour and place")
+
+    def run(self) -> None:
+        """Write the table."""
+        model = read_calibration(self.calibration).data_of(ClosedSensor).in_place
+        write_atomically(self.output, partial(write_normal_table, model))
+        print_safe(f"Normals by colour and place saved to {self.output}")
 
 
 def _now() -> str:

@@ -115,6 +115,9 @@ def _commands() -> dict[str, str]:
         "studies.EvaluateCommand": "compare measured presses with their true values",
         "records.RecordsCommand": "list earlier measurements, or write them as CSV",
         "calibrate.RefreshCommand": "a closed sensor's calibration after its gel was changed",
+        "calibrate.ExportNormalsCommand": (
+            "write a closed sensor's normals by colour and place, for other programs"
+        ),
         "calibrate.DriftCommand": (
             "compare an image of the untouched sensor with the calibration's background"
         ),

@@ -8,12 +8,14 @@ import cv2
 import numpy as np
 import pytest
 from report_pdf import report_data
+from scipy.interpolate import RegularGridInterpolator
 
 from app.cli.main import MENDABLE, main
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
 from gelpolight_core.calibration.closed_sensor_recipe import BALLS
 from gelpolight_core.output.report.calibration_report import calibration_report
+from gelpolight_core.reconstruction.height_map import normals_from_slopes
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +131,43 @@ def test_reports_show_presses_and_what_is_not_known(
     assert sections["balls"].listings[0].rows == (("ball_99.png", "No ball. Press one."),)
     shown = [row[0] for row in sections["in_place"].listings[0].rows]
     assert shown == [press.name for press in closed_run.results[BALLS].result.presses]
+
+
+@pytest.mark.function("Take a closed sensor's normals to a program that looks them up by colour")
+def test_the_exported_table_gives_the_normals_of_the_calibration(
+    calibration, closed_run, closed_session, tmp_path
+):
+    path = tmp_path / "normals.npz"
+    assert main(["export-normals", str(calibration), "-o", str(path)]) == 0
+    with np.load(path) as stored:
+        table = {name: stored[name] for name in stored.files}
+    image = closed_session.images("balls")[0].rgb
+    model = closed_run.calibration.data.in_place
+    blur = float(table["smoothing_nodes"])
+    light, flat = (cv2.GaussianBlur(part, (0, 0), blur) for part in (image, table["background"]))
+    change = (light - flat) / (flat + table["offset"])
+    axes = [table[name] for name in ("y_mm", "x_mm", "red", "green", "blue")]
+    look_up = RegularGridInterpolator(axes, table["normal"])
+    ball = closed_run.results[BALLS].result.presses[0].ball
+    rows, columns = np.indices(change.shape[:2])
+    inside = np.hypot(columns - ball.x, rows - ball.y) < 0.9 * ball.contact
+    places = model.grid.y_mm[rows[inside]], model.grid.x_mm[columns[inside]]
+    found = look_up(np.column_stack([*places, change[inside]]))
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    slopes = ball.slopes(columns[inside] - ball.x, rows[inside] - ball.y)
+    true = np.column_stack([-slopes, -np.ones(len(slopes))])
+    true /= np.linalg.norm(true, axis=1, keepdims=True)
+    degrees = np.degrees(np.arccos(np.clip((found * true).sum(axis=1), -1.0, 1.0)))
+    assert degrees.mean() < 2.0
+    own = normals_from_slopes(*model.slopes(change))[inside]
+    off = np.degrees(np.arccos(np.clip((found * own).sum(axis=1), -1.0, 1.0)))
+    assert np.quantile(off, 0.99) < 0.5
+    assert 0.0 < table["seen"].mean() < 1.0
+
+
+def test_an_open_sensor_has_no_table_of_normals(small_calibration, tmp_path, capsys):
+    path = tmp_path / "open.gplcal"
+    write_calibration(small_calibration, path)
+    command = ["export-normals", str(path), "-o", str(tmp_path / "table.npz")]
+    assert main(command) == MENDABLE
+    assert "another kind of sensor" in capsys.readouterr().err
