@@ -35,6 +35,8 @@ FLAT_WEIGHT = 0.1
 STEP = 2
 """Every second node is used: the image is smooth over two."""
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+TOWARDS_EARLIER = (1.0, 10.0, 100.0)
+"""Further ones towards an earlier calibration: few presses of another gel may add nothing to it."""
 GROWTHS = (1.0, 4.0, 16.0)
 LOSS_CAP = 0.3
 """Largest mean squared slope error that a press can have in the sum."""
@@ -204,8 +206,9 @@ def choose_ridge(
     """
     parts = _without_folds(sums)
     best, min_loss = replace(FIRST_RIDGE, towards=towards), np.inf
+    strengths = RIDGES if towards is None else (*RIDGES, *TOWARDS_EARLIER)
     for growths in product(GROWTHS, GROWTHS):
-        for strength in RIDGES:
+        for strength in strengths:
             ridge = RidgePenalty(strength, *growths, towards)
             loss = 0.0
             for fold, others in parts:

@@ -29,6 +29,7 @@ from gelpolight_core.measurement.object_measurement import measure_object
 from gelpolight_core.reconstruction.background_shift import background_shift, with_zero
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.simulation.indenters import BallIndenter, press_surface
@@ -269,6 +270,31 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(closed_run, clos
         )
 
     assert error(mended) <= error(alone) + 0.1
+
+
+def test_three_presses_do_not_spoil_an_earlier_calibration(closed_run, closed_session):
+    earlier = closed_run.calibration
+    keep = {path.name for path in closed_session.files("balls")[:3]}
+    others = [path for path in closed_session.files("balls") if path.name not in keep]
+    excluded = frozenset(f"balls/{path.name}" for path in others)
+    few = replace(closed_session, decisions=replace(closed_session.decisions, excluded=excluded))
+    mended = run_calibration(few, recipe_with_prior(earlier.data.in_place.coefficients))
+    places = {ball[0]: ball[1:] for ball in earlier.data.balls}
+
+    def degrees(calibration: Calibration) -> float:
+        reconstructor, errors = Reconstructor(calibration), []
+        for path in others:
+            x, y, contact, radius = places[path.name]
+            found = reconstructor.depth(closed_session.image(path).rgb)
+            across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
+            inside = np.hypot(across, down) < 0.9 * contact
+            root = np.sqrt(radius**2 - across[inside] ** 2 - down[inside] ** 2)
+            true = np.stack([across[inside], down[inside], -root], axis=-1) / radius
+            cosine = (true * found.normals[inside]).sum(axis=-1)
+            errors.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).mean())
+        return float(np.mean(errors))
+
+    assert degrees(mended.calibration) < degrees(earlier) + 0.1
 
 
 def test_drift_and_zero_work_without_optics(closed_run, closed_session):
