@@ -84,7 +84,7 @@ class RefreshCommand(Command):
         metavar="IMAGE",
     )
     session: Path | None = option(
-        "background and three or more ball presses of the new gel, which correct them",
+        "background and ball presses of the new gel, which correct them",
         one_of=True,
         metavar="SESSION",
     )

@@ -174,7 +174,8 @@ def find_slopes(
         grid = replace(grid, lens=scale.lens)
     # A scale that is stated without a standard deviation has 1 %.
     scale_sd = 0.01 if sd is None else sd / grid.mm_per_px
-    presses, unreadable = _presses(session, background)
+    least = LEAST_PRESSES if towards is None else 1
+    presses, unreadable = _presses(session, background, least)
     noise = _noise(grid.cut(background.rgb))
     result = calibrate_in_place(
         background.rgb, presses, grid, noise, scale_sd=scale_sd, towards=towards, progress=progress
@@ -247,7 +248,7 @@ def measured_scale(session: Session, background: LinearImage) -> MeasuredScale:
 
 
 def _presses(
-    session: Session, background: LinearImage
+    session: Session, background: LinearImage, least: int
 ) -> tuple[list[BallImage], dict[str, InputError]]:
     """Return the ball images of the background's size, and the faults of the others."""
     images, unreadable = session.usable_images("balls")
@@ -258,8 +259,8 @@ def _presses(
         placed = None if drawn is None else ImageCircle(drawn.u_px, drawn.v_px, drawn.radius_px)
         radius_mm = session.ball_radius_mm(image.name)
         presses.append(BallImage(image.name, image.rgb, radius_mm, placed))
-    if len(presses) < LEAST_PRESSES:
-        text = f"there are {len(presses)} ball images, {LEAST_PRESSES} are needed"
+    if len(presses) < least:
+        text = f"there are {len(presses)} ball images, {least} are needed"
         raise InputError(text, session.folder / "balls", Remedy.PRESS_BALLS)
     return presses, unreadable
 
@@ -462,7 +463,7 @@ def with_background(
         0.0,
         warn=1.0,
         higher_is_better=True,
-        remedy="Press a ball at three or more places and repair the calibration with them",
+        remedy="Press a ball at eight or more places and repair the calibration with them",
     )
     quality = {**calibration.quality, "gel": QualityTable((unseen,))}
     return replace(calibration, data=changed, quality=quality, provenance=provenance)

@@ -87,7 +87,7 @@ def closed_press_scatter(seen: Float64Array | None) -> HealthyPressScatter:
     seen : (presses, KINDS) float64 or None
         Result of :func:`changes_of` for each, if it is known.
     """
-    if seen is None:
+    if seen is None or len(seen) < 2:
         return ANY_LIGHT
     count = len(seen)
     # Of a normal value that few others predict: Student's distribution.

@@ -197,6 +197,8 @@ def choose_ridge(
 ) -> RidgePenalty:
     """Return the ridge with the smallest error of presses that were left out.
 
+    One press leaves none to compare: it hardly moves an earlier calibration.
+
     Parameters
     ----------
     sums : sequence of PressNormalEquations
@@ -204,6 +206,8 @@ def choose_ridge(
     towards : (terms, 2) or None
         As of :class:`RidgePenalty`.
     """
+    if len(sums) == 1:
+        return replace(FIRST_RIDGE, strength=TOWARDS_EARLIER[-1], towards=towards)
     parts = _without_folds(sums)
     best, min_loss = replace(FIRST_RIDGE, towards=towards), np.inf
     strengths = RIDGES if towards is None else (*RIDGES, *TOWARDS_EARLIER)

@@ -73,6 +73,7 @@ from .ridge_fit import (
 )
 
 LEAST_PRESSES = 3
+"""Presses that a calibration needs by itself; one is enough to correct an earlier one."""
 ROUNDS = 3
 TRUST_SLOPES = 0.4
 """Weight of the slopes against the edge in the position of a press, from `MANY_PRESSES` on."""
@@ -198,33 +199,41 @@ def calibrate_in_place(
     Raises
     ------
     InputError
-        If fewer than 3 images show a ball that agrees with the others, or a background of another
-        gel, crop or sensor explains too little of the slopes of presses that are left out.
+        If fewer than 3 images (without `towards`) show a ball that agrees with the others, or a
+        background of another gel, crop or sensor explains too little of the slopes of presses that
+        are left out.
     """
     reduced = grid.reduce(background)
     bare = make_reference_image(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
-    refuse_dead_channel(images, reduced)
+    least = LEAST_PRESSES if towards is None else 1
+    if len(images) >= LEAST_PRESSES:  # fewer do not show all directions of slope
+        refuse_dead_channel(images, reduced)
     lights = press_lights(presses, grid, reduced, noise)
     contacts, refused = _begin(presses, images, lights, bare, grid, progress)
+    as_background = share_as_background(lights)
+    if len(contacts) < least and as_background < LEAST_START:
+        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
+    _require_presses(contacts, refused, least)
     stretch = stretch_of([press.stretches for press in contacts])
     sums = _sums(contacts)
     ridge = choose_ridge(sums, towards)
     for round_number in range(ROUNDS):
         if round_number > 0:
-            contacts, sums = _explained(contacts, refused, sums, leave_one_out_fits(sums, ridge))
+            without = leave_one_out_fits(sums, ridge)
+            contacts, sums = _explained(contacts, refused, sums, without, least)
         progress(0.35 + 0.15 * round_number)
         contacts = _placed(contacts, leave_one_out_fits(sums, ridge))
         sums = _sums(contacts)
     ridge = choose_ridge(sums, towards)
-    contacts, sums = _explained(contacts, refused, sums, leave_one_out_fits(sums, ridge))
+    without = leave_one_out_fits(sums, ridge)
+    contacts, sums = _explained(contacts, refused, sums, without, least)
     progress(0.85)
     without = leave_one_out_fits(sums, ridge)
     colours, balls = [press.colours for press in contacts], [press.ball for press in contacts]
     share = float(np.median(held_out_slope_ratios(colours, balls, without)))
     items = zip(colours, balls, [c / share for c in without], strict=True)
     held_out = tuple(in_parallel(lambda item: held_out_press(*item), items))
-    as_background = share_as_background(lights)
     if as_background < LEAST_START and explained_share(held_out) < LEARNT:
         raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
     model = InPlaceModel(
@@ -327,10 +336,6 @@ def _begin(
                 refused[press.name] = contact
             else:
                 contacts.append(contact)
-    as_background = share_as_background(lights)
-    if len(contacts) < LEAST_PRESSES and as_background < LEAST_START:
-        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
-    _require_presses(contacts, refused)
     return contacts, refused
 
 
@@ -339,14 +344,14 @@ def _not_the_background(share: float) -> str:
 
 
 def _require_presses(
-    presses: Sequence[_PressRefinement], refused: Mapping[str, InputError]
+    presses: Sequence[_PressRefinement], refused: Mapping[str, InputError], least: int
 ) -> None:
-    if len(presses) >= LEAST_PRESSES:
+    if len(presses) >= least:
         return
     reasons = sorted({fault.found for fault in refused.values()})
     wide = [fault.advice for fault in refused.values()].count(Remedy.CHECK_SIZES)
     total = len(presses) + len(refused)
-    text = f"{len(presses)} of {total} images show a pressed ball, {LEAST_PRESSES} are needed"
+    text = f"{len(presses)} of {total} images show a pressed ball, {least} are needed"
     text += f" ({'; '.join(reasons[:2])})" if reasons else ""
     advice = Remedy.CHECK_SIZES if 2 * wide > len(refused) else Remedy.PRESS_BALLS
     raise InputError(text, "balls", advice)
@@ -408,6 +413,7 @@ def _explained(
     refused: dict[str, InputError],
     sums: Sequence[PressNormalEquations],
     coefficients: Sequence[Float64Array],
+    least: int,
 ) -> tuple[list[_PressRefinement], list[PressNormalEquations]]:
     """Return the presses whose slopes agree with the others, with their sums."""
     errors = np.sqrt(
@@ -423,7 +429,7 @@ def _explained(
             )
             refused[press.name] = InputError(text, press.name, Remedy.CHECK_RADIUS)
     rest = list(compress(presses, agreeing))
-    _require_presses(rest, refused)
+    _require_presses(rest, refused, least)
     return rest, list(compress(sums, agreeing))
 
 

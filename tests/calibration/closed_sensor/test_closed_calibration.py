@@ -272,13 +272,15 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(closed_run, clos
     assert error(mended) <= error(alone) + 0.1
 
 
-def test_three_presses_do_not_spoil_an_earlier_calibration(closed_run, closed_session):
+@pytest.mark.parametrize("count", [1, 3])
+def test_few_presses_do_not_spoil_an_earlier_calibration(closed_run, closed_session, count):
     earlier = closed_run.calibration
-    keep = {path.name for path in closed_session.files("balls")[:3]}
+    keep = {path.name for path in closed_session.files("balls")[:count]}
     others = [path for path in closed_session.files("balls") if path.name not in keep]
     excluded = frozenset(f"balls/{path.name}" for path in others)
     few = replace(closed_session, decisions=replace(closed_session.decisions, excluded=excluded))
     mended = run_calibration(few, recipe_with_prior(earlier.data.in_place.coefficients))
+    assert len(mended.results[BALLS].result.presses) == count
     places = {ball[0]: ball[1:] for ball in earlier.data.balls}
 
     def degrees(calibration: Calibration) -> float:
