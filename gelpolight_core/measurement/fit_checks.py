@@ -36,6 +36,7 @@ def fit_problems(
         The object's edge, if it was stated.
     """
     problems = (
+        _other_part(window),
         _blurred(fit),
         _other_edge(fit, edge),
         None if fit.converged else doubtful_finding("not_converged", "the fit did not converge"),
@@ -46,6 +47,17 @@ def fit_problems(
         _no_anchor(window),
     )
     return tuple(finding for finding in problems if finding is not None)
+
+
+def _other_part(window: FitWindow) -> Finding | None:
+    if window.other_mm is None:
+        return None
+    x_mm, y_mm = window.other_mm
+    text = (
+        f"at the border, at ({x_mm:.1f}, {y_mm:.1f}) mm, the membrane looks pressed, too: another "
+        "contact, damage or dirt, or light that has changed"
+    )
+    return doubtful_finding("other_part", text)
 
 
 def _blurred(fit: IndenterFit) -> Finding | None:

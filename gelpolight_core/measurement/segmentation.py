@@ -109,6 +109,8 @@ class FitWindow:
         Where they are known.
     ground : (rows, columns) bool
         What lies beyond the wall.
+    other_mm : (float, float) or None
+        Another bump (x, y) that the border cuts, where the object was not chosen by a point.
     """
 
     heightmap: HeightMap
@@ -123,6 +125,7 @@ class FitWindow:
     slopes: Float64Array
     known: BoolArray
     ground: BoolArray
+    other_mm: tuple[float, float] | None = None
 
 
 def ground_level_mm(depth_mm: Float64Array, valid: BoolArray) -> tuple[float, float]:
@@ -282,7 +285,11 @@ def find_object(
         raise InputError("no pixel is usable", "depth map", "Check the image and the working area")
     if not pressed.regions:
         raise InputError("no object is pressed", "depth map", Remedy.PRESS_DEEPER)
-    region = _only_region(pressed.regions) if seed_mm is None else _region_at(pressed, seed_mm)
+    other_mm = None
+    if seed_mm is None:
+        region, other_mm = _only_region(pressed.regions)
+    else:
+        region = _region_at(pressed, seed_mm)
     if region.cut:
         text = (
             f"the object at ({region.centre_mm[0]:.1f}, {region.centre_mm[1]:.1f}) "
@@ -324,16 +331,24 @@ def find_object(
         np.stack(slopes),
         known,
         ~core & ~near_wall,
+        other_mm,
     )
 
 
-def _only_region(regions: list[PressedRegion]) -> PressedRegion:
+def _only_region(
+    regions: list[PressedRegion],
+) -> tuple[PressedRegion, tuple[float, float] | None]:
+    """Return the only object, or the deepest beside others that the border cuts.
+
+    The second value is the place of the deepest of these.
+    """
     tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
-    if len(tall) > 1:
+    others = tall[1:]
+    if others and (tall[0].cut or not all(r.cut for r in others)):
         places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
         text = f"{len(tall)} objects are pressed, at {places} mm"
         raise InputError(text, "depth map", Remedy.CHOOSE_OBJECT)
-    return tall[0]
+    return tall[0], others[0].centre_mm if others else None
 
 
 def _region_at(pressed: PressedMap, seed_mm: tuple[float, float]) -> PressedRegion:

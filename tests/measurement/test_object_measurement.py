@@ -240,3 +240,21 @@ def test_a_step_far_beyond_the_map_is_tried_and_rejected(shape, monkeypatch):
     monkeypatch.setattr(indenter_fit, "fit_least_squares", with_far_step)
     assert measure_object(surface, shape=shape).size_mm == usual.size_mm
     assert tried and all(tried)
+
+
+def test_a_part_at_the_border_that_looks_pressed_is_said_beside_the_whole_object():
+    """Light that changes looks like a contact in the corners of some sensors."""
+    alone = pressed("ball", centre=(1.0, 0.0), height=1.0)
+    corner = pressed("ball", centre=(-9.5, -7.5), height=0.6)
+    found = measure_object(on_grid(np.maximum(alone, corner), X, Y), shape="ball")
+    assert next(f.key for f in found.findings) == "other_part"
+    assert found.verdict == "doubtful"
+    usual = measure_object(on_grid(alone, X, Y), shape="ball")
+    assert found.diameter_mm == pytest.approx(usual.diameter_mm, rel=0.01)
+    pointed = measure_object(
+        on_grid(np.maximum(alone, corner), X, Y), shape="ball", seed_mm=(1.0, 0.0)
+    )
+    assert "other_part" not in [f.key for f in pointed.findings]
+    deeper = pressed("ball", centre=(-9.5, -7.5), height=1.4)
+    with pytest.raises(InputError, match="2 objects"):
+        measure_object(on_grid(np.maximum(alone, deeper), X, Y), shape="ball")

@@ -108,6 +108,8 @@ NOISE_REACH = 8.0
 BLOCK_NODES = 11
 """Side of the blocks in which the slopes must belong to a surface: errors of the polynomial are
 alike over so many nodes."""
+KNOWN_SHARE = 0.5
+"""Share of a block's nodes that must be usable."""
 ONE_MODE = "calibration in place has one mode"
 SCATTERING = (
     *("led_weak", "exposure", "uneven", "rows", "colour_mixing", "tone", "room_light", "blurred"),
@@ -243,18 +245,21 @@ class InPlaceSolver:
         """
         errors, size = self._model.errors, (BLOCK_NODES, BLOCK_NODES)
         fitted = surface_slopes(depth_mm, self._model.grid.pitch_mm)
-        off_x, off_y = (
-            cv2.blur(slope - surface, size)
-            for slope, surface in zip((slope_x, slope_y), fitted, strict=True)
+        # Without markers, which are averaged out of the blocks.
+        usable = usable_mask.astype(np.float32)
+        known = cv2.blur(usable, size)
+        off_x, off_y, slope = (
+            cv2.blur(usable * part, size) / np.maximum(known, KNOWN_SHARE)
+            for part in (slope_x - fitted[0], slope_y - fitted[1], cv2.magnitude(*fitted))
         )
-        slope = cv2.blur(cv2.magnitude(*fitted), size)
-        known_mask = usable_mask & (cv2.magnitude(slope_x, slope_y) <= self._model.steepest)
-        whole_mask = cv2.erode(known_mask.astype(np.uint8), np.ones(size, np.uint8)) > 0
-        blocks = np.count_nonzero(known_mask) / BLOCK_NODES**2
+        gentle = (cv2.magnitude(slope_x, slope_y) <= self._model.steepest) | ~usable_mask
+        judged_mask = cv2.erode(gentle.astype(np.uint8), np.ones(size, np.uint8)) > 0
+        judged_mask &= known >= KNOWN_SHARE
+        blocks = np.count_nonzero(judged_mask) / BLOCK_NODES**2
         if blocks < 2.0:
             return ()
         sd = np.interp(slope, errors.slopes, errors.slope_sd)
-        share = np.where(whole_mask, cv2.magnitude(off_x, off_y) / sd, 0.0)
+        share = np.where(judged_mask, cv2.magnitude(off_x, off_y) / sd, 0.0)
         row, column = np.unravel_index(share.argmax(), share.shape)
         times = float(share[row, column]) / math.sqrt(2.0 * math.log(blocks))
         if times <= SIGMAS:
