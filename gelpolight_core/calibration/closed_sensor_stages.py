@@ -34,9 +34,9 @@ from gelpolight_core.calibration.closed_sensor.preset import stated_sizes
 from gelpolight_core.calibration.closed_sensor.press_light_change import BallImage
 from gelpolight_core.calibration.closed_sensor.slope_calibration import (
     BACKGROUND_ADVICE,
-    LEAST_PRESSES,
     InPlaceResult,
     calibrate_in_place,
+    least_presses,
 )
 from gelpolight_core.health.global_change import LEAST_START
 from gelpolight_core.image.linear_image import LinearImage, require_size
@@ -174,8 +174,7 @@ def find_slopes(
         grid = replace(grid, lens=scale.lens)
     # A scale that is stated without a standard deviation has 1 %.
     scale_sd = 0.01 if sd is None else sd / grid.mm_per_px
-    least = LEAST_PRESSES if towards is None else 1
-    presses, unreadable = _presses(session, background, least)
+    presses, unreadable = _presses(session, background, least_presses(towards))
     noise = _noise(grid.cut(background.rgb))
     result = calibrate_in_place(
         background.rgb, presses, grid, noise, scale_sd=scale_sd, towards=towards, progress=progress
@@ -386,7 +385,7 @@ def what_would_help(result: InPlaceResult) -> str:
         return "More balls do not help: markers hide the slope; larger balls hide less of it"
     if len({press.ball.radius for press in result.presses}) == 1:
         return "More balls of this size do not help: press balls of another size, too"
-    return "More balls do not help: this is what the sensor gives, and measurements state it"
+    return "More balls do not help: the stated uncertainty includes this error"
 
 
 def _learning_figures(result: InPlaceResult) -> tuple[Finding, ...]:

@@ -126,6 +126,11 @@ class ContactLightResidual:
         return ()
 
 
+def largest_of(count: float) -> float:
+    """Return the size that the largest of many normal values of deviation 1 has, about."""
+    return math.sqrt(2.0 * math.log(count))
+
+
 def fits_no_surface(times: float, place_mm: tuple[float, float]) -> Finding:
     """Return the finding that the light at a place is that of no surface.
 
@@ -288,7 +293,7 @@ def _worst_block(uneven: Float32Array, step: int, misfit: float) -> tuple[float,
     level = math.hypot(misfit, 0.5 / step / math.sqrt(12.0))
     mean = np.where(at, total / np.maximum(count, 1.0), np.float32(0.0))
     row, column = np.unravel_index(mean.argmax(), mean.shape)
-    worst = float(mean[row, column]) / level / math.sqrt(2.0 * math.log(blocks))
+    worst = float(mean[row, column]) / level / largest_of(blocks)
     return worst, (int(row), int(column))
 
 

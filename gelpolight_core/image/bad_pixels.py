@@ -31,11 +31,12 @@ FAR_SHARE = 0.05
 ROUNDS = 4
 """With the bad pixels of a round left out, more of those between them are seen."""
 LONGEST = 3
-"""Rows and columns of the largest group of bad pixels of a camera, but for lines."""
+"""Rows and columns of the largest group of bad pixels of a camera, but for lines. Chosen: a pixel
+with its neighbours."""
 REST = 2
 """Pixels by which groups are widened before they are joined: not all of a hair differs enough."""
 BY_CHANCE = 1e-3
-"""Expected number of groups by chance below which a group is a thread."""
+"""Expected number of groups by chance below which a group is a hair: one in a thousand images."""
 REACH = 12
 """Distance to the nearest good pixel above which bad pixels are not single pixels or lines."""
 

@@ -93,7 +93,7 @@ def test_a_curve_of_brightness_is_named_and_leaves_the_depth_doubtful(known, sen
 
 
 def test_a_curve_changes_the_texture_within_a_cell_by_its_slope(known):
-    """So that it is told from room light, which changes dark and bright specks alike."""
+    """Room light adds the same light to dark and to bright specks: this tells the two apart."""
     check = HealthCheck(known.calibration.data)
     bare = np.clip(known.bare(), 1e-6, 1.0)
     _, of_curve = check.change(known.noisy(np.asarray(bare ** np.float32(0.97), np.float32)))

@@ -85,8 +85,8 @@ OUTLIER = 3.0
 LEAST_OUTLIER = 0.12
 """... and above this root mean square slope."""
 LEARNT = 0.5
-"""Share of the squared slopes of presses left out that a background must explain if the membrane
-around the balls does not look like it."""
+"""Share of the squared slopes of presses left out that must be found if the membrane around the
+balls does not look like the background. Chosen: with less, most of a slope would be an error."""
 BACKGROUND_ADVICE = "Use a background of the same gel, crop, size and exposure as the ball images"
 
 
@@ -206,14 +206,14 @@ def calibrate_in_place(
     reduced = grid.reduce(background)
     bare = make_reference_image(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
-    least = LEAST_PRESSES if towards is None else 1
+    least = least_presses(towards)
     if len(images) >= LEAST_PRESSES:  # fewer do not show all directions of slope
         refuse_dead_channel(images, reduced)
     lights = press_lights(presses, grid, reduced, noise)
     contacts, refused = _begin(presses, images, lights, bare, grid, progress)
     as_background = share_as_background(lights)
     if len(contacts) < least and as_background < LEAST_START:
-        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
+        raise _not_the_background(as_background)
     _require_presses(contacts, refused, least)
     stretch = stretch_of([press.stretches for press in contacts])
     sums = _sums(contacts)
@@ -235,7 +235,7 @@ def calibrate_in_place(
     items = zip(colours, balls, [c / share for c in without], strict=True)
     held_out = tuple(in_parallel(lambda item: held_out_press(*item), items))
     if as_background < LEAST_START and explained_share(held_out) < LEARNT:
-        raise InputError(_not_the_background(as_background), "background", BACKGROUND_ADVICE)
+        raise _not_the_background(as_background)
     model = InPlaceModel(
         grid,
         reduced,
@@ -259,6 +259,11 @@ def calibrate_in_place(
         as_background,
         bool(bare.markers),
     )
+
+
+def least_presses(towards: Float64Array | None) -> int:
+    """Return how many presses are needed, with or without an earlier calibration."""
+    return LEAST_PRESSES if towards is None else 1
 
 
 def contact_in(
@@ -339,8 +344,9 @@ def _begin(
     return contacts, refused
 
 
-def _not_the_background(share: float) -> str:
-    return f"the background looks like {100.0 * share:.0f} % of the membrane around the balls"
+def _not_the_background(share: float) -> InputError:
+    text = f"the background looks like {100.0 * share:.0f} % of the membrane around the balls"
+    return InputError(text, "background", BACKGROUND_ADVICE)
 
 
 def _require_presses(

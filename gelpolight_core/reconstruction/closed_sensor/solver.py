@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import BoolArray, Float32Array
 from gelpolight_core.base.finding import Finding, HeightReliability, Verdict
 from gelpolight_core.base.row_threads import RowThreadPool
-from gelpolight_core.health.contact_residual import fits_no_surface
+from gelpolight_core.health.contact_residual import fits_no_surface, largest_of
 from gelpolight_core.health.fault_limits import SIGMAS
 from gelpolight_core.health.faults import KEYS, health_of
 from gelpolight_core.health.frame_health import FrameHealth, LightGain
@@ -106,10 +105,10 @@ EXAMPLES = 6
 NOISE_REACH = 8.0
 """Nodes over which the size of the noise is averaged, because there are few examples."""
 BLOCK_NODES = 11
-"""Side of the blocks in which the slopes must belong to a surface: errors of the polynomial are
-alike over so many nodes."""
+"""Side of the blocks in which the slopes must be those of a surface. Chosen: about the width of the
+drape, over which errors of the polynomial are alike."""
 KNOWN_SHARE = 0.5
-"""Share of a block's nodes that must be usable."""
+"""Share of a block's nodes that must be usable. Chosen: markers cover less."""
 ONE_MODE = "calibration in place has one mode"
 SCATTERING = (
     *("led_weak", "exposure", "uneven", "rows", "colour_mixing", "tone", "room_light", "blurred"),
@@ -210,16 +209,15 @@ class InPlaceSolver:
             record.add_skipped("normals", "not requested")
         if not request.uncertainty:
             record.add_skipped("standard deviations", "not requested")
-        normals = None
-        if request.normals:
-            normals = self._normals(*surface_slopes(depth, model.grid.pitch_mm))
+        fitted = surface_slopes(depth, model.grid.pitch_mm)
+        normals = self._normals(*fitted) if request.normals else None
         return DepthSolution(
             depth,
             normals,
             flags,
             (
                 *((free_boundary_note(),) if crossed else ()),
-                *self._misfit(slope_x, slope_y, depth, colours.usable),
+                *self._misfit((slope_x, slope_y), fitted, colours.usable),
             ),
             Trace(request.effort, tuple(record.steps)),
             self._deviations(linear, request, depth, slope_x, slope_y)
@@ -232,27 +230,25 @@ class InPlaceSolver:
 
     def _misfit(
         self,
-        slope_x: Float32Array,
-        slope_y: Float32Array,
-        depth_mm: Float32Array,
+        found: tuple[Float32Array, Float32Array],
+        fitted: tuple[Float32Array, Float32Array],
         usable_mask: BoolArray,
     ) -> tuple[Finding, ...]:
-        """Return the finding on slopes that belong to no surface, if some do not.
+        """Return a finding if the slopes found differ too much from those of the fitted surface.
 
-        The part of a block that belongs to none is compared with the worst that is expected of as
-        many blocks by the errors of presses that were left out. Walls steeper than those of the
-        balls are not judged.
+        The mean difference in a block is compared with the largest that is expected of as many
+        blocks by the errors of presses that were left out. Walls steeper than those of the balls
+        are not judged.
         """
         errors, size = self._model.errors, (BLOCK_NODES, BLOCK_NODES)
-        fitted = surface_slopes(depth_mm, self._model.grid.pitch_mm)
-        # Without markers, which are averaged out of the blocks.
+        # The mean of a block is that of its nodes without markers.
         usable = usable_mask.astype(np.float32)
         known = cv2.blur(usable, size)
         off_x, off_y, slope = (
             cv2.blur(usable * part, size) / np.maximum(known, KNOWN_SHARE)
-            for part in (slope_x - fitted[0], slope_y - fitted[1], cv2.magnitude(*fitted))
+            for part in (found[0] - fitted[0], found[1] - fitted[1], cv2.magnitude(*fitted))
         )
-        gentle = (cv2.magnitude(slope_x, slope_y) <= self._model.steepest) | ~usable_mask
+        gentle = (cv2.magnitude(*found) <= self._model.steepest) | ~usable_mask
         judged_mask = cv2.erode(gentle.astype(np.uint8), np.ones(size, np.uint8)) > 0
         judged_mask &= known >= KNOWN_SHARE
         blocks = np.count_nonzero(judged_mask) / BLOCK_NODES**2
@@ -261,7 +257,7 @@ class InPlaceSolver:
         sd = np.interp(slope, errors.slopes, errors.slope_sd)
         share = np.where(judged_mask, cv2.magnitude(off_x, off_y) / sd, 0.0)
         row, column = np.unravel_index(share.argmax(), share.shape)
-        times = float(share[row, column]) / math.sqrt(2.0 * math.log(blocks))
+        times = float(share[row, column]) / largest_of(blocks)
         if times <= SIGMAS:
             return ()
         grid = self.calibration.table.grid
