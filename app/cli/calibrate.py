@@ -92,7 +92,7 @@ class RefreshCommand(Command):
     def run(self) -> None:
         """Write the refreshed calibration and print its quality."""
         calibration = read_calibration(self.calibration)
-        coefficients = calibration.data_of(ClosedSensor).in_place.coefficients
+        earlier = calibration.data_of(ClosedSensor).in_place
         if self.background:
             images = [read_colours(file, response=calibration.response) for file in self.background]
             image, author = average(images, name=str(self.background[0])), user_name()
@@ -100,7 +100,7 @@ class RefreshCommand(Command):
         else:
             assert self.session is not None  # one of them is required
             session = read_session(self.session)
-            recipe = recipe_with_prior(coefficients)
+            recipe = recipe_with_prior(earlier)
             if not recipe.fits(session):
                 raise InputError(
                     "the session is of an open sensor: session.toml has no table [in_place]",

@@ -11,12 +11,10 @@ from gelpolight_core.base.finding import QualityTable
 from .recipe import Facts, QualityTableSpec, Recipe, Stage, StageContext, StageResults, shape_facts
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from gelpolight_core.calibration.closed_sensor.pixel_scale import MeasuredScale
     from gelpolight_core.image.linear_image import LinearImage
     from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
+    from gelpolight_core.sensor.closed_sensor.slope_model import InPlaceModel
     from gelpolight_core.sensor.sensor_calibration import Calibration, Provenance
     from gelpolight_core.session.session import Session
 
@@ -86,7 +84,7 @@ SCALE = Stage(
 )
 
 
-def _run_balls(work: StageContext, towards: NDArray[np.float64] | None = None) -> SlopesStageResult:
+def _run_balls(work: StageContext, towards: InPlaceModel | None = None) -> SlopesStageResult:
     from .closed_sensor_stages import find_slopes
 
     image, scale = work[BACKGROUND].image, work.results.get(SCALE)
@@ -199,13 +197,13 @@ IN_PLACE = Recipe(
 )
 
 
-def recipe_with_prior(coefficients: NDArray[np.float64]) -> Recipe:
+def recipe_with_prior(earlier: InPlaceModel) -> Recipe:
     """Return the recipe for few presses of a new gel, which correct an earlier calibration.
 
     Parameters
     ----------
-    coefficients : (terms, 2)
-        Slope coefficients of the earlier calibration.
+    earlier : InPlaceModel
+        The slopes of the earlier calibration.
     """
-    balls = replace(BALLS, run=lambda work: _run_balls(work, coefficients))
+    balls = replace(BALLS, run=lambda work: _run_balls(work, earlier))
     return replace(IN_PLACE, stages=(BACKGROUND, SCALE, balls))

@@ -41,6 +41,7 @@ from gelpolight_core.calibration.closed_sensor.slope_calibration import (
 from gelpolight_core.health.global_change import LEAST_START
 from gelpolight_core.image.linear_image import LinearImage, require_size
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import MODEL, UNKNOWN, ClosedSensor
+from gelpolight_core.sensor.closed_sensor.slope_model import InPlaceModel
 from gelpolight_core.sensor.closed_sensor.working_grid import ImageSize, WorkingGrid
 from gelpolight_core.sensor.sensor_calibration import Calibration, ManualEdit, Provenance
 from gelpolight_core.session.session import ClosedSensorSettings, Session
@@ -141,7 +142,7 @@ def find_slopes(
     background: LinearImage,
     scale: MeasuredScale | None = None,
     *,
-    towards: NDArray[np.float64] | None = None,
+    towards: InPlaceModel | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> SlopesStageResult:
     """Find the slopes of a closed sensor's colours.
@@ -154,8 +155,8 @@ def find_slopes(
         The untouched membrane.
     scale : MeasuredScale, optional
         As measured; by default as stated.
-    towards : (terms, 2), optional
-        Coefficients of an earlier calibration that these presses are to correct.
+    towards : InPlaceModel, optional
+        An earlier calibration that these presses are to correct.
     progress : callable, optional
         Called with the share done, 0..1.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float32Array
 from gelpolight_core.reconstruction.height_map import normals_from_slopes
-from gelpolight_core.sensor.closed_sensor.colour_change import OFFSET, SMOOTHING_NODES
+from gelpolight_core.sensor.closed_sensor.colour_change import OFFSET
 from gelpolight_core.sensor.closed_sensor.polynomial_terms import design_rows, position_axes
 from gelpolight_core.sensor.closed_sensor.slope_model import (
     COLOUR_CELLS,
@@ -67,7 +67,7 @@ def write_normal_table(model: InPlaceModel, file: BinaryIO) -> None:
         seen=(model.seen_colours[cell[:, 0], cell[:, 1], cell[:, 2]] > 0.0).reshape(shape),
         background=model.background,
         node_mm=grid.pitch_mm,
-        smoothing_nodes=SMOOTHING_NODES,
+        smoothing_nodes=model.smoothing_nodes,
         offset=OFFSET,
     )
 

@@ -164,6 +164,14 @@ def mean_squared_error(press: PressNormalEquations, coefficients: Float64Array) 
     return max(total, 0.0) / max(press.nodes, 1)
 
 
+def squared_loss(
+    presses: Sequence[PressNormalEquations], coefficients: Sequence[Float64Array]
+) -> float:
+    """Return the sum of the mean squared errors of presses, each with its coefficients."""
+    pairs = zip(presses, coefficients, strict=True)
+    return sum(min(mean_squared_error(press, fitted), LOSS_CAP) for press, fitted in pairs)
+
+
 def leave_one_out_fits(
     sums: Sequence[PressNormalEquations], ridge: RidgePenalty
 ) -> list[Float64Array]:
@@ -217,7 +225,7 @@ def choose_ridge(
             loss = 0.0
             for fold, others in parts:
                 coefficients = _solved(*others, ridge)
-                loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
+                loss += squared_loss([sums[i] for i in fold], [coefficients] * len(fold))
                 if loss > min_loss:
                     break
             if loss < min_loss:

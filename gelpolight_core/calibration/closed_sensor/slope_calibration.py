@@ -24,6 +24,7 @@ from gelpolight_core.health.global_change import LEAST_START
 from gelpolight_core.health.press_scatter import changes_of
 from gelpolight_core.sensor.closed_sensor.colour_change import (
     SMOOTHING_NODES,
+    SMOOTHINGS,
     ColourChange,
     ReferenceImage,
     colour_change,
@@ -64,12 +65,14 @@ from .press_light_change import (
 from .ridge_fit import (
     INSIDE,
     PressNormalEquations,
+    RidgePenalty,
     choose_ridge,
     learning_curve,
     leave_one_out_fits,
     mean_squared_error,
     press_sums,
     solve_ridge,
+    squared_loss,
 )
 
 LEAST_PRESSES = 3
@@ -160,11 +163,17 @@ class _PressRefinement:
     """A press during the refinement, with the first and the present contact."""
 
     name: str
+    image: Float32Array
+    gain: Float64Array
     colours: ColourChange
     start: BallContact
     ball: BallContact
     stretches: tuple[float, ...]
     width: float
+
+    def relative_to(self, bare: ReferenceImage) -> _PressRefinement:
+        """Return the press with its change of colour from this reference."""
+        return replace(self, colours=colour_change(self.image, bare, self.gain))
 
 
 def calibrate_in_place(
@@ -174,7 +183,7 @@ def calibrate_in_place(
     noise: Float64Array,
     *,
     scale_sd: float,
-    towards: Float64Array | None,
+    towards: InPlaceModel | None,
     progress: Callable[[float], None],
 ) -> InPlaceResult:
     """Calibrate a closed sensor.
@@ -191,8 +200,8 @@ def calibrate_in_place(
         Standard deviation of a pixel of a single image.
     scale_sd : float
         Relative standard deviation of the scale.
-    towards : (terms, 2) or None
-        Coefficients of an earlier calibration that few presses correct.
+    towards : InPlaceModel or None
+        An earlier calibration that few presses correct.
     progress : callable
         Called with the share done.
 
@@ -204,7 +213,10 @@ def calibrate_in_place(
         are left out.
     """
     reduced = grid.reduce(background)
-    bare = make_reference_image(reduced)
+    bare = make_reference_image(
+        reduced, SMOOTHING_NODES if towards is None else towards.smoothing_nodes
+    )
+    prior = None if towards is None else towards.coefficients
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
     least = least_presses(towards)
     if len(images) >= LEAST_PRESSES:  # fewer do not show all directions of slope
@@ -217,15 +229,18 @@ def calibrate_in_place(
     _require_presses(contacts, refused, least)
     stretch = stretch_of([press.stretches for press in contacts])
     sums = _sums(contacts)
-    ridge = choose_ridge(sums, towards)
+    ridge = choose_ridge(sums, prior)
     for round_number in range(ROUNDS):
         if round_number > 0:
             without = leave_one_out_fits(sums, ridge)
             contacts, sums = _explained(contacts, refused, sums, without, least)
         progress(0.35 + 0.15 * round_number)
-        contacts = _placed(contacts, leave_one_out_fits(sums, ridge))
+        contacts = _placed(contacts, leave_one_out_fits(sums, ridge), bare.smoothing_nodes)
         sums = _sums(contacts)
-    ridge = choose_ridge(sums, towards)
+    if towards is None:
+        bare, contacts = _as_smooth_as_needed(contacts, reduced, ridge)
+        sums = _sums(contacts)
+    ridge = choose_ridge(sums, prior)
     without = leave_one_out_fits(sums, ridge)
     contacts, sums = _explained(contacts, refused, sums, without, least)
     progress(0.85)
@@ -245,6 +260,7 @@ def calibrate_in_place(
         error_curve(held_out, pitch_mm=grid.pitch_mm),
         scale_sd=scale_sd,
         press_light=np.array([changes_of(*lights[press.name]) for press in contacts]),
+        smoothing_nodes=bare.smoothing_nodes,
     )
     progress(1.0)
     pairs = zip(contacts, held_out, strict=True)
@@ -261,7 +277,7 @@ def calibrate_in_place(
     )
 
 
-def least_presses(towards: Float64Array | None) -> int:
+def least_presses(towards: InPlaceModel | None) -> int:
     """Return how many presses are needed, with or without an earlier calibration."""
     return LEAST_PRESSES if towards is None else 1
 
@@ -329,8 +345,11 @@ def _begin(
         ball = BallContact(edge.x, edge.y, edge.radius, radius, grid.rest).limited()
         # Only a ball's radius limits the edge that is found.
         width = max(edge.radius, seen_radius(image)) if edge.radius > radius else edge.radius
-        colours = colour_change(image, bare, 1.0 + lights[press.name][0].gain)
-        return _PressRefinement(press.name, colours, ball, ball, stretches, width / radius)
+        gain = 1.0 + lights[press.name][0].gain
+        colours = colour_change(image, bare, gain)
+        return _PressRefinement(
+            press.name, image, gain, colours, ball, ball, stretches, width / radius
+        )
 
     contacts: list[_PressRefinement] = []
     refused: dict[str, InputError] = {}
@@ -368,7 +387,9 @@ def _sums(presses: Sequence[_PressRefinement]) -> list[PressNormalEquations]:
 
 
 def _placed(
-    presses: Sequence[_PressRefinement], coefficients: Sequence[Float64Array]
+    presses: Sequence[_PressRefinement],
+    coefficients: Sequence[Float64Array],
+    smoothing_nodes: float,
 ) -> list[_PressRefinement]:
     """Move each ball halfway to the position that follows from the slopes of the others."""
     slope_weight = TRUST_SLOPES * min(1.0, len(presses) / MANY_PRESSES)
@@ -385,11 +406,25 @@ def _placed(
         x = edge_weight * start.x + (1.0 - edge_weight) * by_slopes.x
         y = edge_weight * start.y + (1.0 - edge_weight) * by_slopes.y
         placed = replace(press.ball, x=x, y=y)
-        contact = contact_radius_by_slopes(slope_x, slope_y, placed, smoothing=SMOOTHING_NODES)
+        contact = contact_radius_by_slopes(slope_x, slope_y, placed, smoothing=smoothing_nodes)
         ball = replace(placed, contact=0.5 * (start.contact + contact)).limited()
         return replace(press, ball=ball)
 
     return list(in_parallel(moved, list(zip(presses, coefficients, strict=True))))
+
+
+def _as_smooth_as_needed(
+    presses: Sequence[_PressRefinement], background: Float32Array, ridge: RidgePenalty
+) -> tuple[ReferenceImage, list[_PressRefinement]]:
+    """Return reference and presses with the smoothing by which left-out slopes are most correct."""
+
+    def loss(tried: Sequence[_PressRefinement]) -> float:
+        sums = _sums(tried)
+        return squared_loss(sums, leave_one_out_fits(sums, ridge))
+
+    references = [make_reference_image(background, nodes) for nodes in SMOOTHINGS]
+    smoothed = ([press.relative_to(bare) for press in presses] for bare in references)
+    return min(zip(references, smoothed, strict=True), key=lambda tried: loss(tried[1]))
 
 
 def _sizes(

@@ -17,6 +17,7 @@ from gelpolight_core.image.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
 
+from .colour_change import SMOOTHING_NODES
 from .polynomial_terms import TERMS
 from .slope_model import COLOUR_CELLS, InPlaceModel
 from .working_grid import ImageSize
@@ -107,6 +108,8 @@ class ClosedSensor:
             arrays.append(self.response.curves)
         if m.press_light is not None:
             arrays.append(m.press_light)
+        if m.smoothing_nodes != SMOOTHING_NODES:  # older files do not state it
+            arrays.append(np.float64(m.smoothing_nodes))
         for array in arrays:
             hashed.update(np.ascontiguousarray(array).tobytes())
         return hashed.digest()
@@ -135,6 +138,8 @@ class ClosedSensor:
             raise ValueError("an array does not fit the size of the images")
         if not (0 < size.width and 0 < size.height and m.grid.mm_per_px > 0.0 < m.steepest):
             raise ValueError("the size of the images or the scale is not possible")
+        if not m.smoothing_nodes > 0.0:
+            raise ValueError("the smoothing of the images is not possible")
         m.grid.surface.check()
         if nodes.size < 2 or not (np.diff(nodes) > 0.0).all():
             raise ValueError("the errors are not given over rising slopes")

@@ -12,7 +12,13 @@ from gelpolight_core.base.arrays import BoolArray, Float32Array, Float64Array
 from gelpolight_core.base.compiling import whole
 from gelpolight_core.base.row_threads import RowThreadPool
 
-from .colour_change import ColourChange, ReferenceImage, colour_change, make_reference_image
+from .colour_change import (
+    SMOOTHING_NODES,
+    ColourChange,
+    ReferenceImage,
+    colour_change,
+    make_reference_image,
+)
 from .polynomial_terms import POWERS, evaluate_rows, position_axes, row_coefficients
 from .working_grid import WorkingGrid
 
@@ -70,6 +76,8 @@ class InPlaceModel:
         Changes of the light in the images of the balls, as
         :func:`~gelpolight_core.health.press_scatter.changes_of` gives them; None in files of older
         programs.
+    smoothing_nodes : float
+        Standard deviation of the smoothing of images.
     """
 
     grid: WorkingGrid
@@ -81,11 +89,12 @@ class InPlaceModel:
     follow_gain: bool = True
     scale_sd: float = 0.0
     press_light: Float64Array | None = None
+    smoothing_nodes: float = SMOOTHING_NODES
 
     @cached_property
     def reference(self) -> ReferenceImage:
         """The background, smoothed."""
-        return make_reference_image(self.background)
+        return make_reference_image(self.background, self.smoothing_nodes)
 
     def change(self, rgb: Float32Array, gain: Float64Array | None = None) -> ColourChange:
         """Return the change of colour in a camera image (height, width, 3)."""

@@ -260,7 +260,7 @@ def test_a_new_background_and_new_presses_refresh_a_calibration(closed_run, clos
         f"balls/{p.name}" for p in closed_session.files("balls") if p.name not in keep
     )
     few = replace(closed_session, decisions=replace(closed_session.decisions, excluded=others))
-    mended = run_calibration(few, recipe_with_prior(old.data.in_place.coefficients))
+    mended = run_calibration(few, recipe_with_prior(old.data.in_place))
     assert len(mended.results[BALLS].result.presses) == len(keep)
     alone = run_calibration(few)
 
@@ -279,7 +279,7 @@ def test_few_presses_do_not_spoil_an_earlier_calibration(closed_run, closed_sess
     others = [path for path in closed_session.files("balls") if path.name not in keep]
     excluded = frozenset(f"balls/{path.name}" for path in others)
     few = replace(closed_session, decisions=replace(closed_session.decisions, excluded=excluded))
-    mended = run_calibration(few, recipe_with_prior(earlier.data.in_place.coefficients))
+    mended = run_calibration(few, recipe_with_prior(earlier.data.in_place))
     assert len(mended.results[BALLS].result.presses) == count
     places = {ball[0]: ball[1:] for ball in earlier.data.balls}
 
