@@ -508,7 +508,7 @@ def _covariance(problem: _SlopeProblem, by: Float64Array, weight: Float64Array) 
 
 
 def _along_wall(problem: _SlopeProblem, found: _Round, gain: Float64Array) -> Float64Array:
-    """Return the variance of each parameter by errors that are equal all along the wall.
+    """Return the covariance of the parameters by errors that are equal all along the wall.
 
     Such errors are those of the model: noise has no mean over the nodes at one distance from the
     wall. Their size at an edge is known from what is left of the freedom of the profile.
@@ -530,7 +530,21 @@ def _along_wall(problem: _SlopeProblem, found: _Round, gain: Float64Array) -> Fl
     error2 = np.where(edge, place_mm2 * bend2, np.where(seen, np.maximum(mean2, 0.0), 0.0))
     each = np.einsum("pan,an->pn", gain[..., use], by.outwards[:, use])
     common = np.stack([np.bincount(at, row, minlength=counts.size) for row in each])
-    return np.asarray(common**2 @ error2)
+    return np.asarray((common * error2) @ common.T)
+
+
+def _within_largest_edge(problem: _SlopeProblem, covariance: Float64Array) -> Float64Array:
+    """Return the covariance with the knowledge that any fillet is between 0 and the largest.
+
+    The fit's own covariance has it beside the scatter of the slopes; errors along the wall are
+    larger, and would mean fillets of several mm.
+    """
+    if "edge_radius_mm" not in problem.names:
+        return covariance
+    at = problem.names.index("edge_radius_mm")
+    with_edge = covariance[at]
+    known = with_edge[at] + LARGEST_EDGE_MM**2 / 12.0
+    return np.asarray(covariance - np.outer(with_edge, with_edge) / known)
 
 
 def _finished(
@@ -545,9 +559,9 @@ def _finished(
     gain = np.einsum("pq,qan->pan", covariance, found.derivatives.by * found.weight)
     # Nodes whose slopes follow from one depth have a common error.
     together = 1.0 + nodes.share * (problem.smoothing.nodes_together - 1.0)
-    variance = (gain**2 * _variance(found)).sum(axis=(1, 2)) * together + unknown
-    variance += _along_wall(problem, found, gain)
-    deviation = np.sqrt(np.maximum(variance, 0.0))
+    scatter = np.einsum("pan,qan->pq", gain * _variance(found), gain) * together
+    total = _within_largest_edge(problem, scatter + _along_wall(problem, found, gain))
+    deviation = np.sqrt(np.maximum(np.diag(total) + unknown, 0.0))
     sd = dict(zip(problem.names, deviation.tolist(), strict=True))
     depth = model.depth(values, window.x_mm, window.y_mm)
     across, down = window.x_mm - values["x_mm"], window.y_mm - values["y_mm"]

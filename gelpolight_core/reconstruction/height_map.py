@@ -113,8 +113,8 @@ class HeightMap:
         depth 0. None where contacts were not looked for: the paper's model looks for one only in
         images that show none at first sight.
     image_blur_mm : float or None
-        Standard deviation of the blur of the sensor's images, on the membrane. None where no board
-        showed it.
+        Standard deviation of the blur of the sensor's images, on the membrane; of a closed sensor,
+        of their smoothing. None where no board showed it.
     trace : Trace or None
         Which steps were done, and why the others were left out.
     health : FrameHealth or None

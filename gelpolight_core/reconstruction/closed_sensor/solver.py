@@ -226,6 +226,7 @@ class InPlaceSolver:
             # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
             depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
             lateral_scale_sd=model.scale_sd,
+            image_blur_mm=model.smoothing_nodes * model.grid.pitch_mm,
         )
 
     def _misfit(
