@@ -9,8 +9,8 @@ lateral scale, since depth is slope times length.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +30,9 @@ from gelpolight_core.light.facet_interreflection import (
 )
 from gelpolight_core.light.membrane_field import view_directions
 from gelpolight_core.light.parameter import Parameter
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.modes import FULL
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
 from gelpolight_core.reconstruction.near_light.kernel_structures import (
     GaussNewtonOptions,
@@ -47,7 +49,7 @@ from gelpolight_core.reconstruction.near_light.sensor_maps import (
     sensor_scale,
 )
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reconstruction.solver import SolveRequest
+from gelpolight_core.reconstruction.solver import DepthSolution, SolveRequest, stride_slices
 from gelpolight_core.sensor.sensor_calibration import FullModel, OpenSensor
 from gelpolight_core.stages.balls.ball_geometry import BallPose
 
@@ -55,6 +57,8 @@ from .ball_pixels import DRAPE_WIDTH_MM
 from .ball_press_light import undo_light_change
 from .refinement_parameters import ParameterValues
 
+LEFT_STEP = 8
+"""Nodes of the grid to one of the map of the light that no surface explains."""
 # A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
 # Enough nodes for the median of a plateau; more only cost time.
@@ -71,19 +75,45 @@ STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
 LEAST_STEP = 1e-6
 
 
-def ball_height_error(
+@dataclass(frozen=True, slots=True)
+class PressCheck:
+    """Ball presses as the calibrated sensor reconstructs them.
+
+    Attributes
+    ----------
+    height_errors : (presses,)
+        Relative errors of their heights; NaN where the top of a ball is not solved.
+    left : (rows, columns) float32
+        Light that no surface explains, as a share of that of the untouched membrane: mean over the
+        channels and over the presses that reach a node; NaN where none does.
+    step : int
+        Nodes of the grid to a node of `left`.
+    """
+
+    height_errors: Float64Array
+    left: Float32Array
+    step: int = LEFT_STEP
+
+    @property
+    def height_error(self) -> float:
+        """Root mean square of `height_errors`; 0 without any."""
+        errors = self.height_errors[np.isfinite(self.height_errors)]
+        return float(np.sqrt(np.mean(errors**2))) if errors.size else 0.0
+
+
+def check_presses(
     calibration: OpenSensor,
-    images: Sequence[Float32Array],
+    images: Iterable[Float32Array],
     gains: Sequence[LightGain | None],
     balls: Sequence[BallPose],
-) -> float:
-    """Return the relative error (root mean square) of reconstructed ball presses.
+) -> PressCheck:
+    """Reconstruct ball presses, and compare them with their balls and their light.
 
     Parameters
     ----------
     calibration : OpenSensor
         With its full model.
-    images : sequence of (height, width, 3) float32
+    images : iterable of (height, width, 3) float32
         Raw images of ball presses, linear light.
     gains : sequence of LightGain or None
         Change of the light of each, which is corrected. What the correction leaves tilts the whole
@@ -93,11 +123,19 @@ def ball_height_error(
     """
     assert calibration.full is not None
     solver = NearLightSolver(calibration, workers=usable_cores())
-    points, errors = calibration.table.grid.points_mm(), []
+    grid, errors = calibration.table.grid, []
+    points, at = grid.points_mm(), stride_slices(LEFT_STEP)
+    total, count = (np.zeros(grid.shape, np.float32)[at] for _ in range(2))
     for rgb, gain, ball in zip(images, gains, balls, strict=True):
         # At full scale: coarser nodes would take the more of a ball's depth the smaller it is.
         light = undo_light_change(rgb, gain)
-        depth = solver.depth(light, SolveRequest(normals=False)).depth_mm
+        depth_map = _as_height_map(solver.depth(light, SolveRequest(normals=False)), calibration)
+        depth = depth_map.depth_mm
+        left = solver.residual(light, depth_map, step=LEFT_STEP).mean(axis=2)
+        pressed = np.isfinite(left) & (depth[at] > solver.visible_mm)
+        total[pressed] += left[pressed]
+        count[pressed] += 1.0
+        error = np.nan
         distance_mm = np.linalg.norm(points - ball.centre_mm, axis=-1)
         # Further than 0.3 mm from the ball's top, the slope of the cap has too much weight.
         top = (distance_mm < 0.3) & (solver.maps.kind == 2)
@@ -110,8 +148,26 @@ def ball_height_error(
                 widths = (distance_mm - ball.radius_mm) / DRAPE_WIDTH_MM
                 beside = (widths > 2.0) & (widths < 3.0) & (solver.maps.kind == 2)
                 error_mm -= float(np.median(depth[beside])) if beside.any() else 0.0
-            errors.append(error_mm / ball.depth_mm)
-    return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
+            error = error_mm / ball.depth_mm
+        errors.append(error)
+    left = np.where(count > 0.0, total / np.maximum(count, 1.0), np.float32(np.nan))
+    return PressCheck(np.array(errors), left)
+
+
+def _as_height_map(solved: DepthSolution, calibration: OpenSensor) -> HeightMap:
+    grid = calibration.table.grid
+    return HeightMap(
+        depth_mm=solved.depth_mm,
+        x_mm=grid.x_mm,
+        y_mm=grid.y_mm,
+        pitch_mm=grid.pitch_mm,
+        normals=None,
+        flags=solved.flags,
+        calibration_id="",
+        model=FULL,
+        source="",
+        at_rest=calibration.table.surface,
+    )
 
 
 def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) -> float:

@@ -33,7 +33,13 @@ from gelpolight_core.stages.leds.setup_checks import LEAST_INDEX
 from .ball_pixels import CoarseRayGrid, gather_ball_pixels
 from .board_light import GATHERED_SHARE, BoardLight
 from .conditioning import judge_determined
-from .depth_scale import ball_height_error, height_gradient, lateral_scale_sd, light_feedback
+from .depth_scale import (
+    PressCheck,
+    check_presses,
+    height_gradient,
+    lateral_scale_sd,
+    light_feedback,
+)
 from .height_limits import FAIL_PERCENT, WARN_PERCENT
 from .joint_refinement import CLEAR, JointRefinement, StatedLengthFit, refine_jointly
 from .open_ball_stages import BALLS, REFLECTANCE
@@ -79,12 +85,15 @@ class RefinementStageResult:
         Reflectance factors, filled in the same way.
     findings : tuple of Finding
         About what is stated of the sensor, and how well its parameters are determined.
+    checked : PressCheck or None
+        The presses, reconstructed.
     """
 
     refined: JointRefinement
     full: FullModel
     factors: NDArray[np.float32]
     findings: tuple[Finding, ...] = ()
+    checked: PressCheck | None = None
 
     @property
     def quality(self) -> QualityTable:
@@ -165,14 +174,14 @@ def refine(work: StageContext) -> RefinementStageResult:
     result = RefinementStageResult(
         joint, replace(full, background=filled_light), filled_factors, stated_findings
     )
-    scale_sd, determined = _uncertainty(session, results, result)
+    scale_sd, determined, checked = _uncertainty(session, results, result)
     full = replace(result.full, scale_sd=scale_sd)
-    return replace(result, full=full, findings=(*stated_findings, *determined))
+    return replace(result, full=full, findings=(*stated_findings, *determined), checked=checked)
 
 
 def _uncertainty(
     session: Session, results: StageResults, result: RefinementStageResult
-) -> tuple[ScaleUncertainty, tuple[Finding, ...]]:
+) -> tuple[ScaleUncertainty, tuple[Finding, ...], PressCheck]:
     """Estimate the uncertainty of lengths of the full model, and judge what determines it."""
     full, joint = result.full, result.refined
     calibration = sensor_data(session, results, result)
@@ -182,14 +191,13 @@ def _uncertainty(
         leds = np.arange(calibration.led_positions_mm.size)  # the LEDs come first
         covariance[np.ix_(leds, leds)] = block_diag(*calibration.led_covariance_mm2)
     seen = [ball for ball in results[BALLS].seen if ball.press is not None]
-    # Evenly over the session, so that a single odd press does not decide.
-    some = np.unique(np.linspace(0, len(seen) - 1, 4).round().astype(int)).tolist()
-    unexplained = ball_height_error(
+    checked = check_presses(
         calibration,
-        [session.image(session.folder / BALLS.folder / seen[i].file).rgb for i in some],
-        [seen[i].light.gain for i in some],
-        [joint.balls[i] for i in some],
+        (session.image(session.folder / BALLS.folder / ball.file).rgb for ball in seen),
+        [ball.light.gain for ball in seen],
+        joint.balls,
     )
+    unexplained = checked.height_error
     factor_by_key = {one.key: one.value for one in joint.stated}
     # What presses ask for is not corrected, and remains an error itself.
     asked = [k for k, one in joint.evidence.items() if one.used and k in LATERAL]
@@ -211,7 +219,7 @@ def _uncertainty(
         radius_shift = (factor_by_key["radius"] - 1.0, SHOWN_SD / float(np.sqrt(len(joint.balls))))
     determined = judge_determined(joint.determined, joint.shared, covariance, gradient)
     determined += _feedback(light_feedback(full, calibration.table))
-    return ScaleUncertainty(together, lateral, unexplained, radius_shift), determined
+    return ScaleUncertainty(together, lateral, unexplained, radius_shift), determined, checked
 
 
 def _feedback(gain: float) -> tuple[Finding, ...]:

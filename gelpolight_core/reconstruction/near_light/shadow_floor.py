@@ -133,6 +133,9 @@ def _turned_away(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             along_y = (depth[i + 1, j] - depth[i - 1, j]) / (2.0 * pitch_mm)
             if along_x * along_x + along_y * along_y < GENTLE * GENTLE:
                 continue
+            # By how much the slopes of the four facets at the node differ from their mean.
+            bent_x = abs(0.5 * (depth[i, j + 1] + depth[i, j - 1]) - depth[i, j]) / pitch_mm
+            bent_y = abs(0.5 * (depth[i + 1, j] + depth[i - 1, j]) - depth[i, j]) / pitch_mm
             height = 0.0
             if curved:
                 height = rest[0, i, j]
@@ -143,7 +146,8 @@ def _turned_away(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             for k in range(3):
                 x, y = leds[k, 0] - x_mm - pitch_mm * j, leds[k, 1] - y_mm - pitch_mm * i
                 z = leds[k, 2] + depth[i, j] - height
-                if normal[0] * x + normal[1] * y + normal[2] * z < 0.0:
+                lit = (bent_x * abs(x) + bent_y * abs(y)) * short
+                if normal[0] * x + normal[1] * y + normal[2] * z < -lit:
                     known = 0.0
                     if reflects:
                         known = around[k, m, n]
