@@ -174,6 +174,11 @@ class Quantity:
         return abs(self.error) / self.deviation_expanded
 
     @property
+    def explained(self) -> bool:
+        """Whether its uncertainty explains the deviation: En is at most 1, or not known."""
+        return self.en is None or self.en <= 1.0
+
+    @property
     def finding(self) -> Finding | None:
         """The decision by the tolerance, or None without truth or tolerance."""
         if self.truth is None or self.error_percent is None or self.limit_percent is None:
@@ -195,8 +200,11 @@ class Quantity:
     @property
     def judgement(self) -> str:
         """The decision with tolerance and En value, or "" if it is not judged."""
+        if not self.decision:
+            return ""
         en = "" if self.en is None else f", En {self.en:.2f}"
-        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}" if self.decision else ""
+        why = "" if self.explained else ". The deviation is larger than the uncertainties explain"
+        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}{why}"
 
     @property
     def sentence(self) -> str:
@@ -205,7 +213,7 @@ class Quantity:
             return ""
         return (
             f"{self.label}: measured {self.text}, true {value_text(self.truth, unit=self.unit)}, "
-            f"deviation {self.error_percent:+.2f} % ± "
+            f"deviation {self.error_percent:+z.2f} % ± "
             f"{100.0 * self.deviation_expanded / self.truth:.2f} %: {self.judgement}"
         )
 

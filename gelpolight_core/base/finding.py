@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,6 +11,8 @@ from typing import Any
 
 from .errors import InputError
 
+FILE_NAME = re.compile(r"\S+\.\w+[:\s]|[^:]+\.\w+:")
+"""A name of a file at the start of a text: one word, or all before a colon."""
 TINY = 1e-9
 """Rounding error only: no figure's limit is this close to 0."""
 
@@ -160,7 +163,9 @@ def join_reasons(findings: Iterable[Finding]) -> str:
 
 
 def _sentences(text: str, remedy: str) -> str:
-    text = (text[:1].upper() + text[1:]).rstrip(". ")
+    # A file name keeps its letters.
+    first = text[:1] if FILE_NAME.match(text) else text[:1].upper()
+    text = (first + text[1:]).rstrip(". ")
     return ". ".join((text, remedy)).rstrip(". ") + "." if text or remedy else ""
 
 

@@ -16,6 +16,8 @@ from gelpolight_core.base.safe_reading import short_repr
 SHAPES = {"cylinder": "Cylinder", "cuboid": "Cuboid", "ball": "Ball"}
 WALLED = ("cylinder", "cuboid")
 """Shapes with walls, which have an edge; they are steeper than a ball."""
+EXPANDED = "± U (k = 2)"
+"""Label of an expanded uncertainty."""
 RANGE_MM = (0.0, 1000.0)
 """Range of every length."""
 LENGTH_KEYS = tuple(
@@ -31,17 +33,26 @@ def _length(label: str, none: str, *, tip: str = "", when: When | None = None) -
     return number(0.0, label, *RANGE_MM, " mm", 3, step=0.1, none=none, tip=tip, when=when)
 
 
-def _expanded() -> Any:
+def _expanded(when: When | None = None) -> Any:
     return number(
         0.0,
-        "± U (k = 2)",
+        EXPANDED,
         *RANGE_MM,
         decimals=4,
         step=0.001,
         none="not stated",
         tip="Expanded uncertainty (k = 2) on the certificate of the reference",
-        beside="±",
+        beside=EXPANDED,
+        when=when,
     )
+
+
+def _is_shape(stated: ReferenceObject) -> bool:
+    return stated.shape in SHAPES
+
+
+def _has_walls(stated: ReferenceObject) -> bool:
+    return stated.shape in WALLED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,16 +95,14 @@ class ReferenceObject(_Named):
         "Other side", "the same", when=lambda stated: stated.shape == "cuboid"
     )
     height_mm: float = _length(
-        "Depth",
+        "Height",
         "not known",
         tip="Height of the object from its face to its base, if it has one",
-        when=lambda stated: stated.shape in SHAPES,
+        when=_is_shape,
     )
-    height_expanded_mm: float = _expanded()
-    edge_radius_mm: float = _length(
-        "Edge radius", "fitted", when=lambda stated: stated.shape in WALLED
-    )
-    edge_radius_expanded_mm: float = _expanded()
+    height_expanded_mm: float = _expanded(_is_shape)
+    edge_radius_mm: float = _length("Edge radius", "fitted", when=_has_walls)
+    edge_radius_expanded_mm: float = _expanded(_has_walls)
     certificate: str = text("", "Certificate", "Number of its calibration certificate")
     due: str = text("", "Due on", "End of its calibration, such as 2027-03-31")
     serial: str = text("", "Serial number")
@@ -135,8 +144,8 @@ class ReferenceObject(_Named):
         """Return what is wrong with the reference today."""
         if not self.due or date.fromisoformat(self.due) >= date.today():
             return ()
-        which = self.certificate or self.serial
-        text = f"the calibration of the reference {which} ended on {self.due}"
+        which = self.certificate or self.serial or self.name
+        text = f"the calibration of {f'the reference {which}'.rstrip()} ended on {self.due}"
         remedy = "Have the reference calibrated again, or use another one"
         return (Finding("reference_due", text, verdict=Verdict.WARN, remedy=remedy),)
 

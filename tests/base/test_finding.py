@@ -20,6 +20,13 @@ def test_the_worst_finding_is_the_first_one_with_the_worst_verdict():
     assert join_reasons((doubtful, failed)) == "cut by the border; no light"
 
 
+def test_a_sentence_begins_with_a_capital_and_a_file_name_stays():
+    lines = {"a.png: it is dim": "a.png: it is dim.", "my a.png: dim": "my a.png: dim."}
+    lines |= {"it is dim": "It is dim.", "edge: 2.5 mm": "Edge: 2.5 mm."}
+    lines |= {"session.toml is empty": "session.toml is empty."}
+    assert {text: Finding("k", text).line for text in lines} == lines
+
+
 def test_the_same_note_without_a_number_is_one_note():
     first, second = Finding("k", "a note"), Finding("k", "a note")
     assert first == second

@@ -68,6 +68,14 @@ def test_the_tolerance_is_narrower_by_the_uncertainty_for_conformity_and_wider_a
     assert compared(value, 0.04, 0.03).verdict is decision
 
 
+def test_a_deviation_beyond_both_uncertainties_is_not_explained():
+    explained, wrong = compared(5.09, 0.04, 0.03), compared(5.11, 0.04, 0.03)
+    assert (explained.verdict, wrong.verdict) == (Verdict.PASS, Verdict.PASS)
+    assert (explained.explained, wrong.explained) == (True, False)
+    assert wrong.judgement.startswith(explained.judgement.replace("0.90", "1.10"))
+    assert wrong.judgement != explained.judgement.replace("0.90", "1.10")
+
+
 def test_without_a_stated_uncertainty_the_tolerance_alone_decides():
     assert compared(5.249, None).verdict is Verdict.PASS
     assert compared(5.251, None).verdict is Verdict.FAIL
@@ -155,6 +163,8 @@ def test_a_reference_says_that_its_calibration_has_ended():
     (found,) = replace(PIN, due=(today - timedelta(days=1)).isoformat()).findings()
     assert (found.key, found.verdict) == ("reference_due", Verdict.WARN)
     assert "K-2041" in found.text
+    (found,) = ReferenceObject("ball", 5.0, due="2020-01-31").findings()
+    assert "  " not in found.text
     assert ReferenceObject("cylinder", 5.0, height_mm=1.0).findings() == ()
 
 

@@ -60,13 +60,19 @@ def measurement_report(
         for number, image in enumerate(images)
     )
     validation = stated_validation(calibration)
-    worst = worst_of(figure for section in sections for figure in section.quality.figures)
+    figures = [figure for section in sections for figure in section.quality.figures]
+    judged = any(figure.key == "deviation" for figure in figures)
+    worst = worst_of(figures)
+    # Without a reference there is nothing to pass.
+    default = Verdict.PASS if judged else Verdict.WARN
     measured = ("Measured", f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
+    of_calibration = ("Verdict of the calibration", calibration.verdict.word)
     return Report(
         title=f"Measurement with sensor {calibration.serial}",
-        verdict=Verdict.PASS if worst is None else worst.verdict,
+        verdict=default if worst is None else worst.verdict,
         sections=sections,
-        facts=(measured, *head_facts(calibration)),
+        cause="" if judged else "No decision: no true value of a measured quantity is stated",
+        facts=(measured, *head_facts(calibration), of_calibration),
         validation=validation,
         created=created,
         data={
@@ -110,7 +116,7 @@ def _facts(image: MeasuredPress) -> Facts:
         ("Reference", truth.serial),
         ("Certificate of the reference", truth.certificate),
         ("Valid until", truth.due),
-        ("SHA-256", image.sha256),
+        ("SHA-256 of the image", image.sha256),
     )
     return tuple((name, value) for name, value in reference if value)
 
@@ -123,7 +129,7 @@ def _sizes(quantities: Sequence[Quantity]) -> TextTable:
         ("measured (mm)", lambda q: f"{q.value:.4f}"),
         ("reference (mm)", lambda q: number_text(q.truth, ".4f")),
         ("U of the reference", lambda q: number_text(q.truth_expanded, ".4f")),
-        ("deviation (mm)", lambda q: number_text(q.error, "+.4f")),
+        ("deviation (mm)", lambda q: number_text(q.error, "+z.4f")),
         ("U (mm)", lambda q: f"{q.deviation_expanded:.4f}"),
         ("En", lambda q: number_text(q.en, ".2f")),
         ("tolerance", lambda q: number_text(q.truth and q.limit_percent, "g", " %")),

@@ -7,6 +7,7 @@ from pytestqt.qtbot import QtBot
 
 from app.measure.inspector import ReferenceForm
 from app.measure.press_state import PressState
+from app.widgets.forms import Form
 from gelpolight_core.session.reference_object import ReferenceObject
 
 BALL = ReferenceObject("ball", 8.0, name="Ball 8 mm")
@@ -66,6 +67,16 @@ def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot)
     _show(form, "cylinder")
     _choose(form, again)
     assert form.stated == ReferenceObject(size_mm=5.0, height_mm=0.56)
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_a_hidden_length_hides_its_uncertainty(qtbot, narrow):
+    form = Form(ReferenceObject("ball"), "reference", narrow=narrow)
+    qtbot.addWidget(form)
+    form.show()
+    shown = {name for name, field in form.inputs.items() if field.isVisible()}
+    assert {"height_mm", "height_expanded_mm", "size_expanded_mm"} <= shown
+    assert not shown & {"second_mm", "edge_radius_mm", "edge_radius_expanded_mm"}
 
 
 def test_the_true_values_of_a_known_press_are_filled_in(qtbot):

@@ -21,11 +21,15 @@ from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import write_calibration
 from gelpolight_core.calibration.refinement_parameters import TERMS
 from gelpolight_core.calibration.reflectance_edit import with_edited_curves
+from gelpolight_core.measurement.result import MeasuredPress, Measurement
 from gelpolight_core.output.report.calibration_report import calibration_report
+from gelpolight_core.output.report.certificate import measurement_report
 from gelpolight_core.output.report.document import Report
 from gelpolight_core.output.report.facts import head_facts, stage_facts
 from gelpolight_core.output.report.report_pdf_file import report_pdf, write_report
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.sensor.sensor_calibration import Calibration
+from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.validation import Validation
 
 NASTY = (
@@ -194,6 +198,25 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(value, warn, gap, highe
         return  # at its only limit the direction of the figure is unknown
     sign = "\N{GREATER-THAN OR EQUAL TO}" if higher else "\N{LESS-THAN OR EQUAL TO}"
     assert figure.limit_text.startswith(sign)
+
+
+@pytest.mark.parametrize(("size_mm", "verdict"), [(0.0, "warn"), (2.0, "pass")])
+def test_a_certificate_passes_only_what_was_compared(size_mm, verdict):
+    axis, flat = np.arange(-4.0, 5.0), np.zeros((9, 9), np.float32)
+    heightmap = HeightMap(
+        flat, axis, axis, 1.0, None, flat.astype(np.uint8), "A-1", "full", "p.png"
+    )
+    sd = {"diameter_mm": 0.01, "height_mm": 0.01, "centre_mm": (0.01, 0.01), "drape_decay_mm": 0.1}
+    ball = Measurement(
+        shape="ball", diameter_mm=2.0, side_mm=None, height_mm=1.0, centre_mm=(0.0, 0.0),
+        yaw_deg=None, drape_decay_mm=0.5, sd=sd, edge_radius_mm=None, blur_mm=None,
+        baseline_mm=0.0, residual_rms_mm=0.001, outline_mm=np.zeros((3, 2)),
+    )  # fmt: skip
+    truth = ReferenceObject("ball", size_mm)
+    report = measurement_report(small(), [MeasuredPress("p.png", "ab", heightmap, ball, truth)])
+    assert (report.verdict, bool(report.cause)) == (verdict, not size_mm)
+    assert dict(report.facts)["Verdict of the calibration"] == small().verdict.word
+    assert dict(report.sections[0].facts)["SHA-256 of the image"] == "ab"
 
 
 def test_the_same_report_gives_the_same_file():
