@@ -17,7 +17,7 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
 from app.sources.recording import RecordingSource
-from app.sources.source import Source, SourceFrame
+from app.sources.source import SourceFrame
 from app.views.map.quantities import ReferenceMap
 from app.views.surface.scene_export import ImageChoice, image_dialog
 from app.widgets.actions import make_action
@@ -101,7 +101,7 @@ class FileActions(QObject):
             text = "There is no depth to use as a reference yet."
             self._context.toasts.show(text, "warn")
             return False
-        name = f"frame {last.frame.number}"
+        name = last.frame.name or f"frame {last.frame.number}"
         self._views.processing.show_reference(ReferenceMap(replace(last.raw, source=name), name))
         return True
 
@@ -167,21 +167,17 @@ class ExportChoice:
         return range(self.first - 1, self.last) if self.part else None
 
 
-def frame_name(frame: SourceFrame, source: Source | None, *, processed: bool = False) -> str:
-    """Return the name of an exported frame: of a recording, the same as in the export of a range.
+def frame_name(frame: SourceFrame, *, processed: bool = False) -> str:
+    """Return the name of an exported frame: that of its file, or the same as in an exported range.
 
     Parameters
     ----------
     frame : SourceFrame
         The frame.
-    source : Source or None
-        Its source.
     processed : bool, optional
         Whether its height map is processed. The name then says so.
     """
-    name = f"frame-{frame.number:05d}"
-    if frame.index is not None and source is not None:
-        name = f"{source.name}-{frame.index:05d}"
+    name = Path(frame.name).stem or f"frame-{frame.number:05d}"
     return f"{name}-processed.png" if processed else f"{name}.png"
 
 
@@ -325,7 +321,7 @@ class ExportControl(QObject):
             self._depth.live.suspend(True)
             work = partial(export_recording, source.path, reconstructor, choice)
         elif last is not None and last.heightmap is not None:
-            name = frame_name(last.frame, source, processed=bool(last.processed))
+            name = frame_name(last.frame, processed=bool(last.processed))
             work = partial(export_frame, last.heightmap, choice, name)
         else:
             return

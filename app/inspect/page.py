@@ -106,7 +106,7 @@ class InspectPage(QWidget):
         idle = "Press an object into the membrane. Press Space to freeze it at full detail."
         act, over = self.live_depth.act, self.views.stage.parts
         self.banner = AdviceBanner(self.jobs, idle=idle, on_act=act, over=over)
-        self.replay = ReplayBar("inspect")
+        self.replay = ReplayBar("inspect", lambda: self.pause(False))
         self.processed = ProcessingSummary(self.views.processing.reset)
         parts = self.banner, self.processed, (self.views, 1), self.replay
         vbox(*parts, of=self, margins=0, spacing=0)
@@ -188,6 +188,7 @@ class InspectPage(QWidget):
         """Freeze the image, or continue."""
         self.pause_action.setChecked(on)
         self.pause_action.setText("Continue" if on else "Freeze")
+        self.replay.hold(self._shown.frame if on and self._shown is not None else None)
         self.live.pause(on)
         self._want()
 

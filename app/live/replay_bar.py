@@ -1,11 +1,12 @@
-"""Playback controls of a recording: play, step, seek, loop, speed."""
+"""Playback controls of a recording or a folder of images: play, step, seek, loop, speed."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QCheckBox, QWidget
 
-from app.sources.recording import Playback, RecordingSource
+from app.sources.player import Playback, Player
+from app.sources.source import SourceFrame
 from app.widgets.actions import Slot, icon_button, make_action
 from app.widgets.inputs import ComboBox, Slider
 from app.widgets.layout import hbox
@@ -15,26 +16,27 @@ from app.widgets.widget_names import set_names
 
 
 class ReplayBar(QWidget):
-    """Controls the playback of a recording. Hidden if there is none.
+    """Controls the playback of a recording or a folder of images. Hidden if there is none.
 
     Parameters
     ----------
     page : str
         First part of its object name.
     on_moved : callable, optional
-        Called when the user moved to another frame or started playing.
+        Called when the user moved to another image or started playing.
     """
 
     def __init__(self, page: str, on_moved: Slot = lambda: None) -> None:
         super().__init__()
         set_names(self, f"{page}.replay", "Replay")
         self._moved = on_moved
-        self._source: RecordingSource | None = None
+        self._source: Player | None = None
+        self._resumes = False
         row = hbox(of=self, margins=(8, 2, 8, 2))
         for name, text, slot, keys, icon_name in (
-            ("back", "Previous frame", lambda: self._step(-1), ",", "step-back"),
+            ("back", "Previous image", lambda: self.step(-1), ",", "step-back"),
             ("play", "Play or pause", self._toggle, "Ctrl+Space", "play"),
-            ("on", "Next frame", lambda: self._step(1), ".", "step-on"),
+            ("on", "Next image", lambda: self.step(1), ".", "step-on"),
         ):
             action = make_action(
                 self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name
@@ -48,7 +50,7 @@ class ReplayBar(QWidget):
         self._slider = set_names(
             Slider(Qt.Orientation.Horizontal),
             f"{page}.replay.seek",
-            "Position in the recording",
+            "Position",
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
@@ -65,14 +67,27 @@ class ReplayBar(QWidget):
         self.hide()
 
     def follow(self, source: object) -> None:
-        """Follow a source. The bar is hidden unless the source is a recording."""
-        self._source = source if isinstance(source, RecordingSource) else None
+        """Follow a source. The bar is hidden unless its images are stored."""
+        self._source = source if isinstance(source, Player) else None
+        self._resumes = False
         self.setVisible(self._source is not None)
         if self._source is None:
             self._timer.stop()
         else:
             self._timer.start()
             self._poll()
+
+    def hold(self, frame: SourceFrame | None) -> None:
+        """Stay at a frozen image, whose name is then shown. None: play on, if it was playing."""
+        if self._source is None:
+            return
+        if frame is not None and frame.index is not None:
+            self._resumes = self._source.playback().playing
+            self._source.pause()
+            self._source.seek(frame.index)
+        elif frame is None and self._resumes:
+            self._resumes = False
+            self._source.play()
 
     def _poll(self) -> None:
         if self._source is None:
@@ -96,11 +111,16 @@ class ReplayBar(QWidget):
             if not playing:
                 self._moved()
 
-    def _step(self, count: int) -> None:
-        if self._source is not None:
-            self._source.step(count)
-            self._poll()
-            self._moved()
+    def step(self, count: int) -> bool:
+        """Move forward by a number of images. Return whether there is such an image."""
+        if self._source is None:
+            return False
+        before = self._source.playback().position
+        self._resumes = False
+        self._source.step(count)
+        self._poll()
+        self._moved()
+        return self._source.playback().position != before
 
     def _seek(self, index: int) -> None:
         if self._source is not None:
@@ -114,6 +134,8 @@ class ReplayBar(QWidget):
 
 def playback_text(now: Playback) -> str:
     """Return the position of a player as text."""
+    if now.file:
+        return f"{now.file},  image {now.position + 1} of {now.count}"
     text = f"{now.time_s:.2f} / {now.duration_s:.2f} s,  frame {now.position + 1} of {now.count}"
     if now.damaged:
         text += f",  {now.damaged} damaged"

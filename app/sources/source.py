@@ -29,7 +29,10 @@ class SourceFrame:
         False while the image does not yet show the last change of the source (a setting that has
         no effect yet, an image that is still being rendered).
     index : int or None
-        Index in the recording that is played, which begins again in a loop. None for a live image.
+        Index in the recording or folder that is played, which begins again in a loop. None for a
+        live image.
+    name : str
+        File name of a stored image, after which exports of it are named. Empty for a live image.
     """
 
     rgb: PixelArray
@@ -37,6 +40,7 @@ class SourceFrame:
     time_s: float
     settled: bool = True
     index: int | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         """Reject arrays that are not colour images, and make the memory read-only."""

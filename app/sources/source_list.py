@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import threading
-import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,16 +13,16 @@ from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.image.image_file import files_in
 from gelpolight_core.session.session_images import read_linear_image
 
-from .source import Source, SourceFrame, SourceInfo, SourceSetting, source_closed_error
+from .player import Playback, Player
+from .source import Source, SourceInfo
 from .virtual_bench import VirtualBench
 
 RATE_HZ = 10.0
-# Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
-_CACHE_BYTES = 256 * 2**20
+"""Images per second when a folder is played."""
 
 
-class FolderSource:
-    """PNG and TIFF images of a folder, in the order of their names.
+class FolderSource(Player):
+    """PNG and TIFF images of a folder, in the order of their names: the first one at first.
 
     Parameters
     ----------
@@ -35,56 +33,32 @@ class FolderSource:
     kind = "folder"
 
     def __init__(self, folder: Path) -> None:
-        self.folder = Path(folder)
-        self.name = self.folder.name
+        super().__init__(folder, playing=False)
+        self.name = self.path.name
         self._size = (0, 0)
         self._files: tuple[Path, ...] = ()
-        self._decoded: dict[int, PixelArray] = {}
-        self._closed = threading.Event()
-        self._number, self._due_s = 0, math.nan
 
     def open(self) -> None:
         """List the images and read the first one, whose size all must have."""
-        if self._files:
-            return
-        self._closed.clear()
-        self._number, self._due_s = 0, math.nan
-        files = files_in(self.folder).images
-        if not files:
-            raise InputError("there are no images", self.folder, Remedy.CHOOSE_IMAGES)
-        self._size = read_linear_image(files[0]).size
-        self._files = files
+        with self._changed:
+            if self._times_s.size:
+                return
+            files = files_in(self.path).images
+            if not files:
+                raise InputError("there are no images", self.path, Remedy.CHOOSE_IMAGES)
+            self._files, self._size = files, read_linear_image(files[0]).size
+            self._rewind(np.arange(len(files)) / RATE_HZ)
 
-    def frame(self, timeout_s: float) -> SourceFrame | None:
-        """Wait for the next image. None: it is not due yet."""
-        if not self._files:
-            raise source_closed_error(str(self.folder))
-        now = time.monotonic()
-        due_s = now if math.isnan(self._due_s) else self._due_s
-        if due_s > now and self._closed.wait(min(due_s - now, timeout_s)):
-            return None
-        if due_s > now + timeout_s:
-            return None
-        rgb = self._image(self._number % len(self._files))
-        # A folder waits for its reader, so no frame is ever lost.
-        now = time.monotonic()
-        self._due_s = max(due_s + 1.0 / RATE_HZ, now)
-        self._number += 1
-        return SourceFrame(rgb, self._number - 1, now)
+    def playback(self) -> Playback:
+        """Return the state of the player, with the file of the shown image."""
+        now = super().playback()
+        return replace(now, file=self.image_name(now.position)) if now.count else now
 
-    def settings(self) -> tuple[SourceSetting, ...]:
-        """Return none."""
-        return ()
+    def image_name(self, index: int) -> str:
+        """Return the name of an image's file."""
+        return self._files[index].name
 
-    def close(self) -> None:
-        """Discard the images."""
-        self._closed.set()
-        self._files = ()
-        self._decoded.clear()
-
-    def _image(self, index: int) -> PixelArray:
-        if index in self._decoded:
-            return self._decoded[index]
+    def _read(self, index: int) -> PixelArray:
         image = read_linear_image(self._files[index])
         if image.size != self._size:
             size, first = ("x".join(map(str, size)) for size in (image.size, self._size))
@@ -93,10 +67,13 @@ class FolderSource:
         full_scale = 2**image.bit_depth - 1
         kind = np.uint8 if image.bit_depth == 8 else np.uint16
         rgb: PixelArray = np.rint(image.rgb * np.float32(full_scale)).astype(kind)
-        rgb.flags.writeable = False
-        if rgb.nbytes + sum(decoded.nbytes for decoded in self._decoded.values()) <= _CACHE_BYTES:
-            self._decoded[index] = rgb
         return rgb
+
+
+def next_image(path: Path) -> Path | None:
+    """Return the image file after this one in its folder, or None if it is the last one."""
+    images = files_in(path.parent).images
+    return next((image for image in images if image > path), None)
 
 
 def virtual_sensor(bench: VirtualBench) -> SourceInfo:

@@ -1,12 +1,15 @@
 """The Inspect page as a technician uses it."""
 
 import logging
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -316,7 +319,7 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     export_frame(_last(pressed).heightmap, choice, "again.png", shares.append)
     assert shares[0] >= SHOWN_FROM  # a large file takes seconds
     pressed.export.run(choice)
-    path = tmp_path / "out" / f"frame-{frozen.frame.number:05d}.npz"
+    path = tmp_path / "out" / f"{Path(frozen.frame.name).stem}.npz"
     qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
     with np.load(path, allow_pickle=False) as stored:
         np.testing.assert_array_equal(stored["depth_mm"], _last(pressed).heightmap.depth_mm)
@@ -331,6 +334,34 @@ def test_a_frozen_image_is_read_exported_processed_and_continued(pressed, tmp_pa
     assert _last(pressed).frame.number == frozen.frame.number
     pressed.pause_action.trigger()
     qtbot.waitUntil(lambda: _last(pressed).frame.number > frozen.frame.number, timeout=WAIT_MS)
+
+
+@pytest.mark.function("Step through a folder of images file by file")
+def test_a_frozen_image_of_a_folder_keeps_its_name_and_the_next_file_is_shown_live(
+    page, small_session, small_calibration, context, tmp_path, qtbot
+):
+    for name in ("a.png", "b.png"):
+        shutil.copy(min((small_session / "background").glob("*.png")), tmp_path / name)
+    context.source.choose_folder(tmp_path)
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    words = page.findChild(QLabel, "inspect.replay.words")
+    assert words.isVisible() and words.text().startswith("a.png")
+    page.findChild(QAction, "replay.play").trigger()
+    qtbot.waitUntil(lambda: _last(page).frame.name == "b.png", timeout=WAIT_MS)
+    page.pause(True)
+    frozen = page._shown.frame.name
+    qtbot.wait(300)  # it would have played on
+    assert words.text().startswith(frozen)
+    page.pause(False)
+    others = {"a.png", "b.png"} - {frozen}
+    qtbot.waitUntil(lambda: _last(page).frame.name in others, timeout=WAIT_MS)
+    page.replay.step(-1)
+    page.pause(True)
+    assert page.replay.step(1) and words.text().startswith("b.png")
+    assert not page.live.paused
+    qtbot.waitUntil(lambda: _last(page).frame.name == "b.png", timeout=WAIT_MS)
 
 
 def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_any_more(

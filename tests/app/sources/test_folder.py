@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from app.inspect.export import frame_name
 from app.sources.source import SourceFrame
-from app.sources.source_list import FolderSource
+from app.sources.source_list import FolderSource, next_image
 from gelpolight_core.base.errors import InputError
 
 
@@ -39,12 +40,29 @@ def folder(tmp_path):
 def test_images_repeat_in_the_order_of_their_names(folder):
     source = FolderSource(folder)
     source.open()
+    source.play()
     for number in range(5):
         frame = following(source)
         assert frame.rgb.shape == (240, 320, 3)
         assert frame.number == number
         assert np.array_equal(frame.rgb, image(number % 3))
     source.close()
+
+
+@pytest.mark.function("Step through a folder of images file by file")
+def test_a_folder_stays_at_a_file_until_stepped_and_names_it(folder):
+    source = FolderSource(folder)
+    source.open()
+    for step, name in ((0, "a.png"), (0, "a.png"), (1, "b.TIFF"), (1, "c.png"), (1, "c.png")):
+        if step:
+            source.step(step)
+        frame = following(source)
+        assert frame.name == source.playback().file == name
+        assert frame_name(frame) == f"{Path(name).stem}.png"
+        assert np.array_equal(frame.rgb, image("abc".index(name[0])))
+    source.close()
+    assert next_image(folder / "a.png") == folder / "b.TIFF"
+    assert next_image(folder / "c.png") is None
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])
@@ -62,8 +80,8 @@ def test_an_image_of_another_size_is_rejected_by_name(folder):
     write(folder / "d.png", image(3, size=(160, 120)))
     source = FolderSource(folder)
     source.open()
-    for _ in range(3):
-        following(source)
+    following(source)
+    source.seek(3)
     with pytest.raises(InputError, match=r"d\.png: the image has 160x120 pixels"):
         source.frame(1.0)
 

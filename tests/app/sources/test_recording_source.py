@@ -30,7 +30,7 @@ class Clock:
 def clock(monkeypatch):
     """Make the source use the test's clock."""
     clock = Clock()
-    monkeypatch.setattr("app.sources.recording.time", clock)
+    monkeypatch.setattr("app.sources.player.time", clock)
     return clock
 
 
@@ -164,7 +164,7 @@ def test_an_exported_frame_is_named_after_its_place_in_the_recording_also_in_a_l
         clock.now_s += 0.01 * bool(tick)
         while (frame := source.frame(0.0)) is not None:
             assert frame.index == shown(frame)
-            names.append(frame_name(frame, source))
+            names.append(frame_name(frame))
     source.close()
     assert len(names) > 6  # it began again
     assert names[6:8] == ["press-00000.png", "press-00001.png"]
