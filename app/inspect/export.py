@@ -26,6 +26,7 @@ from app.widgets.forms import Form, form_dialog
 from gelpolight_core.base.atomic_write import write_atomically
 from gelpolight_core.base.form_fields import folder as folder_field
 from gelpolight_core.base.form_fields import number, several, switch
+from gelpolight_core.health.frame_health import refuse_meaningless
 from gelpolight_core.measurement.map_processing import subtract_map
 from gelpolight_core.output.formats import HEIGHT_MAP_FORMATS, PROFILE_FORMATS
 from gelpolight_core.output.heightmap_files import write_heightmap, write_profile
@@ -214,7 +215,7 @@ def export_recording(
     Raises
     ------
     InputError
-        If the recording, a frame or a file cannot be used.
+        If the recording, a frame or a file cannot be used, or a frame's depth is meaningless.
     """
     from gelpolight_core.output.recording.recording_reader import Recording
 
@@ -223,8 +224,10 @@ def export_recording(
     with Recording.open(path) as recording:
         for done, index in enumerate(choice.frames):
             progress(done / len(choice.frames))
-            frame = recording.frame(index)
-            heightmap = reconstructor.depth(frame.rgb, name=f"{path.stem}-{index:05d}.png")
+            name = f"{path.stem}-{index:05d}.png"
+            heightmap = reconstructor.depth(recording.frame(index).rgb, name=name)
+            if heightmap.health is not None:
+                refuse_meaningless(heightmap.health, where=name)
             written += write_heightmap(
                 heightmap, Path(choice.folder), formats=choice.formats, stride=choice.stride
             )
@@ -299,8 +302,11 @@ class ExportControl(QObject):
 
     def ask(self) -> None:
         """Ask what to export, and export it."""
-        if self._depth.last is None or self._depth.last.heightmap is None:
-            self._context.toasts.show("There is no depth to export yet.", "warn")
+        last = self._depth.last
+        if last is None or last.heightmap is None:
+            fault = None if last is None else last.fault
+            text = "There is no depth to export yet." if fault is None else fault.line
+            self._context.toasts.show(text, "warn")
             return
         source, count, at = self._depth.live.source, 0, 0
         if isinstance(source, RecordingSource):

@@ -265,12 +265,14 @@ class InspectViews(QWidget):
         self.stage.show_frame(result, still=still)
         if result.cut is not None:
             self.section.show_cut(result.cut)
+        if result.fault is not None and self._has_depth:
+            self.forget(result.fault.line)
 
-    def forget(self) -> None:
-        """Clear the depth: the calibration or source changed, or there is none."""
+    def forget(self, text: str = "No depth yet.") -> None:
+        """Show a text instead of the depth: the calibration or source changed, or there is none."""
         self._has_depth = False
         self._on_marks()
-        self.stage.show_message("No depth yet.")
+        self.stage.show_message(text)
         self.section.show_cut(SectionResult())
 
     def compare_with(self, reference: ReferenceMap | None) -> None:

@@ -28,6 +28,8 @@ from app.views.map.quantities import (
 from app.views.map.sections import SectionResult, SectionSettings, measure_sections
 from app.views.surface.display_surface import LIVE_NODES, ColourScale, DisplaySurface, surface_of
 from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.finding import Finding
+from gelpolight_core.health.frame_health import FrameHealth
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.map_processing import subtract_map
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
@@ -137,6 +139,8 @@ class FrameResult:
         Measurements along the line.
     depth_ms, total_ms : float
         Time of the reconstruction, and of all steps.
+    health : FrameHealth or None
+        Faults of the frame, if it was reconstructed. There is no depth if they make it meaningless.
     """
 
     frame: SourceFrame
@@ -157,6 +161,12 @@ class FrameResult:
     cut: SectionResult | None = None
     depth_ms: float = 0.0
     total_ms: float = 0.0
+    health: FrameHealth | None = None
+
+    @property
+    def fault(self) -> Finding | None:
+        """The fault that makes the depth meaningless, or None."""
+        return None if self.health is None else self.health.meaningless
 
 
 class FrameProcessor:
@@ -191,6 +201,8 @@ class FrameProcessor:
         if self.live is None or not request.needs_depth:
             return FrameResult(frame, camera=camera)
         raw, depth_ms = self._heightmap(frame, request)
+        if raw.health is not None and raw.health.meaningless is not None:
+            return FrameResult(frame, camera=camera, health=raw.health)
         processed = self._process(raw, request.processing) if request.still else ProcessedMap(raw)
         heightmap = processed.heightmap
         misfit = self._misfit(frame, raw, request)
@@ -221,6 +233,7 @@ class FrameProcessor:
             cut=None if section is None else measure_sections(heightmap, section, request.region),
             depth_ms=depth_ms,
             total_ms=1e3 * (time.perf_counter() - began),
+            health=raw.health,
         )
 
     def _heightmap(self, frame: SourceFrame, request: FrameRequest) -> tuple[HeightMap, float]:

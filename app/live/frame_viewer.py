@@ -289,6 +289,8 @@ class FrameViewer(QWidget):
         if result.camera is not None:
             rows, columns = result.frame.rgb.shape[:2]
             self.camera.show_rgb(result.camera, size=(columns, rows))
+        if result.fault is not None:
+            self.show_message(result.fault.line)
         if result.heightmap is None:
             return
         self._heightmap = result.heightmap
@@ -303,7 +305,7 @@ class FrameViewer(QWidget):
     def show_message(self, text: str) -> None:
         """Show a text instead of the depth."""
         self._heightmap = None
-        self.surface.show_surface(None)
+        self.surface.show_message(text)
         for panel in self.panels.values():
             panel.show_message(text)
 

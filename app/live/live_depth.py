@@ -268,10 +268,9 @@ class LiveDepth(QObject):
         self._set_fault(None)
 
     def _follow_health(self, result: FrameResult) -> None:
-        heightmap = result.heightmap
-        if heightmap is None or heightmap.health is None or not result.frame.settled:
+        if result.health is None or not result.frame.settled:
             return
-        findings = self._watch.update(heightmap.health, result.frame.time_s).findings
+        findings = self._watch.update(result.health, result.frame.time_s).findings
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:

@@ -154,13 +154,17 @@ class SurfacePanel(QWidget):
         if self.view is not None:
             self.view.view_from(name)
 
-    def show_surface(self, surface: DisplaySurface | None, *, still: bool = False) -> None:
-        """Show the surface of a frame, live or `still`. None: there is none."""
+    def show_message(self, text: str) -> None:
+        """Show a text instead of the surface."""
+        self._last = None
+        self._words.setText(text)
+        self._stack.setCurrentWidget(self._words)
+        self.set_pins(())
+
+    def show_surface(self, surface: DisplaySurface, *, still: bool = False) -> None:
+        """Show the surface of a frame, live or `still`."""
         self._last = surface
-        if surface is None:
-            self._stack.setCurrentWidget(self._words)
-            self.set_pins(())
-        elif self.view is not None:
+        if self.view is not None:
             self.view.show_surface(surface, still=still)
             if self.pins:
                 self._draw_pins()
@@ -252,7 +256,8 @@ class SurfacePanel(QWidget):
             self._flat.deleteLater()
             self._flat = None
         self._hint.setVisible(not self._settings.display(HINT_SEEN))
-        self.show_surface(self._last)
+        if self._last is not None:
+            self.show_surface(self._last)
 
     def _on_display(self) -> None:
         if self.view is not None:

@@ -364,6 +364,28 @@ def test_a_frozen_image_of_a_folder_keeps_its_name_and_the_next_file_is_shown_li
     qtbot.waitUntil(lambda: _last(page).frame.name == "b.png", timeout=WAIT_MS)
 
 
+@pytest.mark.function("See why there is no depth of another sensor's image")
+def test_an_image_of_another_sensor_is_reported_in_place_of_its_depth_and_not_exported(
+    page, small_session, small_calibration, context, tmp_path, qtbot, monkeypatch
+):
+    shown = read_linear_image(min((small_session / "background").glob("*.png"))).rgb.shape
+    noise = np.random.default_rng(0).integers(0, 255, shown, np.uint8)
+    cv2.imwrite(str(tmp_path / "other.png"), noise)
+    context.source.choose_folder(tmp_path)
+    page.enter()
+    _use(page, small_calibration)
+    qtbot.waitUntil(lambda: _last(page) is not None and _last(page).health is not None)
+    fault = _last(page).fault
+    assert _last(page).heightmap is None
+    qtbot.waitUntil(lambda: _advice(page)[0] == fault.line)  # it lasts
+    views, said = page.views, list[str]()
+    assert views.surface._words.text() == fault.line and not views.map_panel.map.has_image
+    assert views.section.cut.profile is None
+    monkeypatch.setattr(context.toasts, "show", lambda text, *_: said.append(text))
+    page.export.ask()
+    assert said == [fault.line]
+
+
 def test_nothing_stays_on_the_page_of_a_source_or_calibration_that_is_not_used_any_more(
     pressed, small_session, context, qtbot
 ):

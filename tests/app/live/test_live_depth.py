@@ -33,8 +33,8 @@ def depth(context, qtbot):
 def outcome(health: FrameHealth, time_s: float, *, settled: bool = True) -> Any:
     """Return the result of a frame, as far as its health goes."""
     frame = SimpleNamespace(time_s=time_s, settled=settled, rgb=np.zeros((4, 6, 3), np.uint8))
-    heightmap = SimpleNamespace(health=health, trace=None)
-    return Done(frame, SimpleNamespace(frame=frame, heightmap=heightmap))
+    heightmap = SimpleNamespace(trace=None)
+    return Done(frame, SimpleNamespace(frame=frame, heightmap=heightmap, health=health))
 
 
 def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth):

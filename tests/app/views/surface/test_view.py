@@ -90,7 +90,7 @@ def test_pins_take_their_depth_from_each_frame_and_go_with_the_source(panel, mad
     (height,) = view.actors["pins-points"].mapper.dataset.points[:, 2]
     assert height == pytest.approx(view.scene.style.exaggeration * 0.5 * BUMP[2], abs=0.01)
     assert "0.500 mm" in view.actors["pin-text"].GetText(1)
-    panel.show_surface(None)  # the source or the calibration changed
+    panel.show_message("No depth yet.")  # the source or the calibration changed
     panel.show_surface(made())
     assert not [name for name in view.actors if name.startswith("pin")]
 
