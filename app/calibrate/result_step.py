@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QPushButton, QTabWidget, QWidget
+from PySide6.QtWidgets import QGridLayout, QPushButton, QTabWidget, QWidget
 
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
+from app.program.workspace import Workspace
 from app.views.map.colour_tables import colour_table
 from app.widgets.actions import push_button
 from app.widgets.label import MarkupLabel, escaped
@@ -29,14 +30,18 @@ from gelpolight_core.base.finding import (
     worst_of,
 )
 from gelpolight_core.base.root_causes import best_cause, cause_and_rest
+from gelpolight_core.calibration.joint_stage import term_facts
 from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
+from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 from .image_panels import MapsView, most_oblique_press
+from .image_step import ImageStep
 from .page_state import RUNNING, RemedyButton, StepState, is_done
+from .result_plot import ResultPlot
 from .step import Step
 
 SET_UP = "setup"
@@ -103,10 +108,62 @@ def corrective_action(
 
 if TYPE_CHECKING:
     from app.calibrate.reflectance.lut_editor import CurveEditorPanel
+    from gelpolight_core.calibration.project import CalibrationProject
+    from gelpolight_core.output.report.result_pictures import ResultPicture
 
 FAIL, OUTDATED = StageState.FAIL, StageState.STALE
 MAIN = ("ball_height_error_percent", "held_out_normal_deg")
 """Figures that say how good the whole calibration is; a recipe has one of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnResult:
+    """What the page shows of a finished calibration, beside its figures.
+
+    Attributes
+    ----------
+    pictures : tuple of ResultPicture
+        As in the report.
+    terms : str
+        What the sensor's light needs, and what is left out, as markup.
+    earlier : str
+        The last calibration of the sensor; empty without one.
+    """
+
+    pictures: tuple[ResultPicture, ...]
+    terms: str
+    earlier: str
+
+
+def drawn_result(project: CalibrationProject, workspace: Workspace) -> DrawnResult:
+    """Return the pictures of a finished calibration, its terms, and the one before it."""
+    from gelpolight_core.output.report.result_pictures import result_pictures  # slow to import
+
+    run = project.finish()
+    c, terms, earlier = run.calibration, "", ""
+    if isinstance(c.data, OpenSensor) and c.data.full is not None:
+        facts = term_facts(c.data.full)
+        for title, wanted in (("What this sensor needs", True), ("Left out", False)):
+            rows = [
+                f"<br>{escaped(f'{name}: {text}')}"
+                for name, text, needed in facts
+                if needed is wanted
+            ]
+            terms += f"<h4>{title}</h4>{''.join(rows).removeprefix('<br>')}" if rows else ""
+    for entry in workspace.entries():
+        summary = entry.summary
+        if summary is None or entry.serial != c.serial or summary.inputs == c.provenance.inputs:
+            continue
+        figure = main_figure(summary.quality.values())
+        if figure is not None:
+            earlier = f"The last one, {summary.created[:10]}: {figure.value_text}"
+            break
+    return DrawnResult(result_pictures(c, run), terms, earlier)
+
+
+def main_figure(tables: Iterable[QualityTable]) -> Finding | None:
+    """Return the figure that says how good a whole calibration is, if there is one."""
+    return next((f for table in tables for f in table.figures if f.key in MAIN), None)
 
 
 class VerdictOverview(QWidget):
@@ -122,10 +179,32 @@ class VerdictOverview(QWidget):
         self.more.setCheckable(True)
         self.more.toggled.connect(self.every.setVisible)
         self.every.hide()
-        inside = QWidget()
-        vbox(self.poor, hbox(self.more, None), self.every, None, of=inside, margins=0, spacing=16)
+        self.plots: tuple[ResultPlot, ...] = ()
+        self.terms = set_names(MarkupLabel(wrap=True), "result.terms", "Terms of the light")
+        self.earlier = named_label("result.earlier", "Last calibration", role="muted")
+        self._pictures, inside = QGridLayout(), QWidget()
+        self._pictures.setSpacing(16)
+        parts = self.poor, self._pictures, self.terms, hbox(self.more, None), self.every, None
+        vbox(*parts, of=inside, margins=0, spacing=16)
         scroll = set_names(scroll_area(inside), "result.scroll", "Figures")
-        vbox(self.headline, (scroll, 1), of=self, margins=24, spacing=16)
+        vbox(self.headline, self.earlier, (scroll, 1), of=self, margins=24, spacing=12)
+
+    def show_result(self, drawn: DrawnResult, chosen: Callable[[str], object]) -> None:
+        """Show these pictures and texts in place of the last ones: maps are two in a row."""
+        for plot in self.plots:
+            plot.deleteLater()
+        self.plots = tuple(map(ResultPlot, drawn.pictures))
+        row, column = 0, 0
+        for plot in self.plots:
+            plot.chosen.connect(chosen)
+            wide = any(plot.picture.labels)
+            self._pictures.addWidget(plot, row, column, 1, 2 if wide else 1)
+            column = 0 if wide else 1 - column
+            row += column == 0
+        self.terms.setText(drawn.terms)
+        self.terms.setVisible(bool(drawn.terms))
+        self.earlier.setText(drawn.earlier)
+        self.earlier.setVisible(bool(drawn.earlier))
 
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
         """Show the figures of stages by their titles, the poor ones first, `cause` only once."""
@@ -156,6 +235,7 @@ class ResultStep(Step):
 
     def build(self) -> None:
         """Create what only this step shows."""
+        self._drawn: object = None
         self.overview = VerdictOverview()
         self.save = push_button("result.save", "&Save the calibration", self.store)
         self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
@@ -203,10 +283,7 @@ class ResultStep(Step):
 
     def number(self) -> Finding | None:
         """Return the figure of the whole calibration."""
-        figures = join_quality_tables(
-            status.quality for status in self.model.statuses.values()
-        ).figures
-        return next((figure for figure in figures if figure.key in MAIN), None)
+        return main_figure(status.quality for status in self.model.statuses.values())
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Return buttons that correct the one cause: enter the number, or go to the step."""
@@ -261,6 +338,8 @@ class ResultStep(Step):
         is_complete = all(map(_is_made, statuses.values()))
         has_failed = any(status.state is FAIL for status in statuses.values())
         is_idle = all(state != RUNNING for state, _ in model.page.states.values())
+        if is_complete and is_idle and not has_failed:
+            self._draw_result()
         self.save.setText("&Save as a draft" if has_failed else "&Save the calibration")
         self.save.setEnabled(is_complete and is_idle)
         set_property(self.save, "primary", is_complete and not model.saved)
@@ -268,6 +347,24 @@ class ResultStep(Step):
         self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
         set_property(self.panel.next, "primary", bool(model.saved))
         self._show_tab()
+
+    def _draw_result(self) -> None:
+        """Draw the pictures of new results, in the background."""
+        last = self.results.get(self.project.recipe.stages[-1])
+        if last is self._drawn:
+            return
+        self._drawn = last
+        work = partial(drawn_result, self.project, self.context.workspace)
+        done = partial(self.overview.show_result, chosen=self._open_press)
+        self.model.short_jobs.submit(BackgroundJob("Drawing", lambda _progress: work(), done))
+
+    def _open_press(self, stem: str) -> None:
+        """Show the ball press of this name in its step."""
+        step = next(s for s in self.model.page.steps if BALLS.key in s.stages)
+        self.model.step_requested.emit(step.key)
+        if isinstance(step, ImageStep):
+            files = self.project.session.captured(step.folder)
+            step.show_capture(next(file.name for file in files if file.stem == stem))
 
     def _show_tab(self) -> None:
         """Update the tab that is shown. The others are updated when they are opened."""

@@ -37,12 +37,12 @@ def _joint_facts(c: OpenSensor) -> Facts:
             (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
-        *_term_facts(full),
+        *((name, text) for name, text, _ in term_facts(full)),
     )
 
 
-def _term_facts(full: FullModel) -> Facts:
-    """Return what each term is worth to held-out presses, with its values."""
+def term_facts(full: FullModel) -> tuple[tuple[str, str, bool], ...]:
+    """Return each term with its values and what it is worth, and whether it is needed."""
     from .refinement_parameters import TERMS
 
     membrane = full.membrane
@@ -65,7 +65,7 @@ def _term_facts(full: FullModel) -> Facts:
         ]
         is_needed = term.parameters[0].full_key in full.membrane_sd
         parts = (*fitted, worth) if is_needed else ("not needed", worth)
-        facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts)))
+        facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts), is_needed))
     return tuple(facts)
 
 

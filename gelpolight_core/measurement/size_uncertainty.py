@@ -20,11 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL
+from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL, stated_sd
 from gelpolight_core.reconstruction.height_map import COARSE, HeightMap
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.contact_detection import MARGIN_DECAYS
 from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
+from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
 
 from .indenter_fit import IndenterFit
 from .map_slopes import are_solved, smoothing_of
@@ -120,6 +123,51 @@ fit covers the larger part of it. The paper's model uses the lights of the undef
 the point where a ray meets that surface."""
 
 
+DECAY_MM = 0.65
+"""Typical decay length of a membrane's drape, where the calibration does not state it."""
+
+
+def expected_sd(c: Calibration, shape: str, size_mm: float, height_mm: float) -> dict[str, float]:
+    """Return the standard deviations that an object pressed by `height_mm` will have.
+
+    They are those of calibration and model, without those of noise and of the fit.
+
+    Parameters
+    ----------
+    c : Calibration
+        Of an open sensor with its full model, or of a closed one.
+    shape : str
+        ``ball`` or ``cylinder``.
+    size_mm : float
+        Its diameter.
+    height_mm : float
+        Its depth.
+    """
+    values = dict.fromkeys(("x_mm", "y_mm"), 0.0) | {"height_mm": height_mm}
+    values |= {"diameter_mm": size_mm, "drape_decay_mm": DECAY_MM}
+    floor_mm = blur_mm = 0.0
+    if isinstance(c.data, ClosedSensor):
+        closed = c.data.in_place
+        pitch_mm, lateral = closed.grid.pitch_mm, closed.scale_sd
+        depth = math.hypot(closed.errors.depth_share, 2.0 * lateral)
+        floor_mm, blur_mm = closed.errors.depth_floor_mm, closed.smoothing_nodes * pitch_mm
+    else:
+        data = c.data_of(OpenSensor)
+        full, pitch_mm = data.full, data.table.grid.pitch_mm
+        assert full is not None and full.scale_sd is not None, "a calibration states both"
+        values["drape_decay_mm"] = full.decay_mm or DECAY_MM
+        scale, lengths = full.scale_sd, stated_sd(data.stack, full.scale_sd.shown)
+        depth, lateral = (
+            math.hypot(scale.depth, lengths.depth),
+            math.hypot(scale.lateral, lengths.lateral),
+        )
+    error = MODE_ERRORS[Mode(c.model, EFFORTS[-1])]
+    mode = replace(error, node_mm=pitch_mm * error.node_mm, level_mm=floor_mm, blur_mm=blur_mm)
+    by_calibration = calibration_sd(shape, values, depth, lateral, mode.depth_by_lateral)
+    by_mode = _mode_sd(shape, values, mode)
+    return {name: math.hypot(sd, by_mode.get(name, 0.0)) for name, sd in by_calibration.items()}
+
+
 def mode_error(heightmap: HeightMap) -> ModeError:
     """Return the remaining error of the model and effort of a height map.
 
@@ -180,7 +228,7 @@ def sd_by_source(fit: IndenterFit, window: FitWindow, mode: ModeError | None) ->
         common = 0.0 if mode is None else mode.depth_by_lateral
         scales = heightmap.depth_scale_sd, heightmap.lateral_scale_sd
         calibration = calibration_sd(fit.shape, fit.values, *scales, common)
-    by_mode = {} if mode is None else _mode_sd(fit, mode)
+    by_mode = {} if mode is None else _mode_sd(fit.shape, fit.values, mode)
     node_mm = smoothing_of(heightmap).node_mm
     coarse = not are_solved(heightmap) or node_mm > 1.5 * heightmap.pitch_mm
     if coarse and fit.shape != "ball":
@@ -243,13 +291,12 @@ def calibration_sd(
     return sd
 
 
-def _mode_sd(fit: IndenterFit, mode: ModeError) -> dict[str, float]:
-    """Return the standard deviations of the fit's parameters by the mode."""
-    values = fit.values
+def _mode_sd(shape: str, values: Mapping[str, float], mode: ModeError) -> dict[str, float]:
+    """Return the standard deviations of a fit's parameters by the mode."""
     share = mode.depth_share(_wall_slope(values), values["drape_decay_mm"])
-    sd = _systematic(fit.shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
+    sd = _systematic(shape, values, share, mode.lateral_per_mm * abs(values["height_mm"]))
     sd["height_mm"] = math.hypot(sd["height_mm"], mode.level_mm)
-    if fit.shape != "ball":
+    if shape != "ball":
         rounded_mm = WIDTH_BY_NODES * mode.node_mm**2 / values["drape_decay_mm"]
         for name in {*LENGTHS} & sd.keys():
             sd[name] = math.hypot(sd[name], rounded_mm, mode.wall_blurs * mode.blur_mm)

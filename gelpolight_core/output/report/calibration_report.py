@@ -11,7 +11,7 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.channels import CHANNEL_KEYS
-from gelpolight_core.base.finding import Verdict
+from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.base.root_causes import cause_and_rest
 from gelpolight_core.calibration import closed_sensor_recipe
 from gelpolight_core.calibration.calibration_file import contents_of
@@ -42,6 +42,7 @@ from gelpolight_core.stages.leds.mirror_spots import MirrorSpots
 from .document import Parts, Report, ReportSection, TextTable, ValidationSummary, make_text_table
 from .drawing_tools import ColourTable
 from .facts import head_facts, stage_facts
+from .result_pictures import result_pictures
 
 Colours = ColourTable | None
 
@@ -181,11 +182,10 @@ def _top_pose(c: OpenSensor, run: CalibrationRun | None, _: Colours) -> dict[str
 def _lights(c: OpenSensor, run: CalibrationRun | None, _: Colours) -> dict[str, Parts]:
     parts: dict[str, Parts] = {"crosstalk": ((), (crosstalk_shares(c.crosstalk),))}
     if run is None:
-        return {"lights": ((drawings.led_plan(c),), ()), **parts}
+        return parts
     leds = run.results[LIGHTS].leds
     mirror = drawings.mirror_spots(leds.spots, run.session.averaged(LIGHTS.folder).rgb)
-    plan = drawings.led_plan(c, leds.bright_points_mm)
-    return {"lights": ((mirror, plan), (rejected_glints(leds.spots),)), **parts}
+    return {"lights": ((mirror,), (rejected_glints(leds.spots),)), **parts}
 
 
 def _radiance(c: OpenSensor, run: CalibrationRun | None, colours: Colours) -> dict[str, Parts]:
@@ -275,16 +275,22 @@ def calibration_report(
             parts |= show(c.data, run, colours)
     validation = validation or stated_validation(c)
     cause, quality = cause_and_rest(c.quality)
-    sections = tuple(
-        ReportSection(
-            key,
-            stage_title(key),
-            recipe.tables[key].about if key in recipe.tables else "",
-            table,
-            facts.get(key, ()),
-            *parts.get(key, ((), ())),
-        )
-        for key, table in quality.items()
+    pictures = tuple(map(drawings.result_picture, result_pictures(c, run)))
+    about = "What measurements with this calibration will be worth"
+    result = ReportSection("result", "Result", about, QualityTable(), drawings=pictures)
+    sections = (
+        result,
+        *(
+            ReportSection(
+                key,
+                stage_title(key),
+                recipe.tables[key].about if key in recipe.tables else "",
+                table,
+                facts.get(key, ()),
+                *parts.get(key, ((), ())),
+            )
+            for key, table in quality.items()
+        ),
     )
     sources = tuple(sorted(c.provenance.sources.items()))
     return Report(

@@ -14,7 +14,7 @@ from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.reflectance_scatter import ReflectanceScatter
 from gelpolight_core.geometry.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.light.reflectance_table import ReflectanceTable
-from gelpolight_core.output.drawing_thread import Axes, Circle, Ellipse, Figure, LogNorm
+from gelpolight_core.output.drawing_thread import Axes, Circle, Figure, ListedColormap, LogNorm
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.sensor.sensor_calibration import OpenSensor
 from gelpolight_core.stages.balls.ball_press import BallPress
@@ -28,7 +28,6 @@ from .document import ReportDrawing
 from .drawing_tools import (
     ACCENT,
     COLOURS,
-    MARKERS,
     ColourTable,
     draw_three_maps,
     drawing,
@@ -38,7 +37,23 @@ from .drawing_tools import (
     round_to_one_digit,
     show_image,
 )
+from .result_pictures import (
+    DIVERGING,
+    LED_ROLES,
+    Bars,
+    Field,
+    Label,
+    Level,
+    Line,
+    Mark,
+    ResultPicture,
+)
 
+ROLE_COLOURS = dict(zip(LED_ROLES, COLOURS, strict=True)) | {
+    "accent": "#1f4fbf",
+    "warn": "#c77800",
+    "muted": "0.6",
+}
 VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
 
 
@@ -198,52 +213,41 @@ def _paint_spot(axes: Axes, image: Float32Array, spot: MirrorSpot, channel: int)
     axes.set_title(title, fontsize=6.5, color=COLOURS[channel])
 
 
-@drawing(68.0, 110.0)
-def led_plan(
-    figure: Figure, calibration: OpenSensor, bright_points_mm: Float64Array | None = None
-) -> str:
-    """Show the LEDs from above, with their uncertainty.
-
-    Parameters
-    ----------
-    figure : Figure
-        Empty.
-    calibration : OpenSensor
-        LEDs, covariance and the working area.
-    bright_points_mm : (3, 2) or (3, 3), optional
-        Points on the mirror that reflected each LED, if known.
-    """
-    table, leds_mm = calibration.table, calibration.led_positions_mm
-    covariance_mm2 = calibration.led_covariance_mm2[:, :2, :2]
-    largest_mm = float(np.sqrt(np.linalg.eigvalsh(covariance_mm2).max()))
-    # The largest ellipse is about 2 mm wide.
-    factor = max(round_to_one_digit(2.0 / max(largest_mm, 1e-6)), 1.0)
+@drawing(66.0, 140.0)
+def result_picture(figure: Figure, picture: ResultPicture) -> str:
+    """Draw a picture of the result."""
     axes = figure.subplots()
-    visible = table.valid[::8, ::8].astype(float)
-    x_mm, y_mm = table.grid.x_mm[::8], table.grid.y_mm[::8]
-    axes.contourf(x_mm, y_mm, visible, levels=[0.5, 1.5], colors=["0.88"])
-    axes.plot([], [], "s", color="0.85", label="visible membrane")
-    radius_mm = calibration.sensor.working_diameter_mm / 2
-    axes.add_patch(Circle((0, 0), radius_mm, fill=False, color="0.6", ls="--"))
-    for k, colour in enumerate(COLOURS):
-        x, y = leds_mm[k, :2]
-        axes.plot(x, y, MARKERS[k], color=colour, label=CHANNEL_KEYS[k], markersize=5)
-        values, vectors = np.linalg.eigh(covariance_mm2[k])
-        width, height = 2.0 * factor * np.sqrt(np.maximum(values, 0.0))
-        angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
-        axes.add_patch(Ellipse((x, y), width, height, angle=angle, fill=False, color=colour))
-        if bright_points_mm is not None:
-            axes.plot(*bright_points_mm[k, :2], "x", color=colour, markersize=4)
-    axes.plot(0.0, 0.0, "+", color="0.3")
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
-    axes.margins(0.12)
-    axes.invert_yaxis()
-    figure.legend(loc="outside right center")
-    caption = (
-        "LED positions from above (x and y as in the image). Ellipses: one standard deviation, "
-        f"drawn {factor:.0f} times as large"
-    )
-    return caption if bright_points_mm is None else caption + "; x: its mirror spot"
+    for mark in picture.marks:
+        _paint_mark(axes, mark)
+    axes.set(title=picture.title, xlabel=picture.labels[0], ylabel=picture.labels[1])
+    if any(isinstance(mark, Line) and mark.name for mark in picture.marks):
+        axes.legend(loc="upper right")
+    if any(picture.labels):
+        axes.set_ylim(bottom=0.0)
+    else:
+        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+        axes.invert_yaxis()
+    return picture.caption.rstrip(".")
+
+
+def _paint_mark(axes: Axes, mark: Mark) -> None:
+    match mark:
+        case Bars(names, values, roles):
+            at = range(len(names))
+            axes.bar(at, values, 0.7, color=[ROLE_COLOURS[role] for role in roles])
+            axes.set_xticks(at, map(printable, names), rotation=90.0 if len(names) > 12 else 0.0)
+        case Line(x, y, role, name):
+            axes.plot(x, y, color=ROLE_COLOURS[role], lw=1.0, label=name or None)
+        case Label(x, y, text, role):
+            axes.text(x, y, printable(text), color=ROLE_COLOURS[role], ha="center", va="center")
+        case Level(value, text):
+            axes.axhline(value, color=ROLE_COLOURS["warn"], ls="--", lw=0.8)
+            place = (0.01, value)
+            axes.annotate(text, place, xycoords=("axes fraction", "data"), va="bottom")
+        case Field(values, (left, right, top, bottom), reach):
+            extent, colours = (left, right, bottom, top), ListedColormap(DIVERGING / 255.0)
+            image = axes.imshow(values, extent=extent, cmap=colours, vmin=-reach, vmax=reach)
+            axes.figure.colorbar(image, ax=axes, label="%")
 
 
 @drawing(58.0)

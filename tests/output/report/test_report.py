@@ -68,7 +68,7 @@ def written(report: Report, folder: Path) -> Path:
 def test_programs_find_every_figure_of_every_stage_in_the_file(small_run, whole_file):
     data = report_data(whole_file)
     quality = small_run.calibration.quality
-    assert [section["key"] for section in data["sections"]] == list(quality)
+    assert [section["key"] for section in data["sections"]] == ["result", *quality]
     for section in data["sections"]:
         found = {figure["key"]: figure["value"] for figure in section["figures"]}
         assert found == {f.key: f.value for f in quality[section["key"]].figures}

@@ -1,0 +1,271 @@
+"""The pictures of a calibration's result, described once for the window and for the report.
+
+A picture is a title, a caption and marks; a painter knows the five marks, and nothing of sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import PurePath
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from gelpolight_core.base.arrays import Float32Array, Float64Array
+from gelpolight_core.base.compared_quantity import COVERAGE, PAPER_PERCENT
+from gelpolight_core.calibration.closed_sensor_recipe import BALLS as CLOSED_BALLS
+from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.calibration.open_sensor_recipe import LENS, TOP_POSE
+from gelpolight_core.calibration.project import CalibrationRun
+from gelpolight_core.calibration.refinement_stage import RefinementStageResult
+from gelpolight_core.measurement.size_uncertainty import expected_sd
+from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
+from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
+
+Role = Literal["accent", "warn", "muted", "red", "green", "blue"]
+DIVERGING = np.concatenate(
+    [
+        np.linspace(start, stop, 128)
+        for start, stop in pairwise(((33, 92, 172), (247, 247, 247), (178, 24, 43)))
+    ]
+).astype(np.uint8)
+"""Colours (256, 3) of a field: blue, white, red."""
+LED_ROLES: tuple[Role, ...] = ("red", "green", "blue")
+DEPTHS_MM = np.geomspace(0.1, 1.5, 40)
+"""Depths for which the uncertainty is predicted."""
+BALL_MM = 10.0
+"""Diameter of the ball for which that of a closed sensor is predicted: it hardly matters."""
+MOST_NAMES = 20
+"""Contacts that are named in the plan. Chosen: names of more would overlap."""
+BOARDS = "Grey: corners of the board on the top surface."
+ELLIPSE_MM = 1.0
+"""Length of the largest half axis of the drawn uncertainty of an LED."""
+
+
+class Bars(NamedTuple):
+    """Bars side by side, with the role of each."""
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    roles: tuple[Role, ...]
+
+
+class Line(NamedTuple):
+    """A line through points; with a name, it is in the legend."""
+
+    x: Float64Array
+    y: Float64Array
+    role: Role
+    name: str = ""
+
+
+class Label(NamedTuple):
+    """A text at a point."""
+
+    x: float
+    y: float
+    text: str
+    role: Role
+
+
+class Level(NamedTuple):
+    """A dashed horizontal line with its text."""
+
+    value: float
+    text: str
+
+
+class Field(NamedTuple):
+    """A map of values, from blue at `-reach` to red at `reach`; NaN where nothing is known.
+
+    `edges` are left, right, top and bottom.
+    """
+
+    values: Float32Array
+    edges: tuple[float, float, float, float]
+    reach: float
+
+
+Mark = Bars | Line | Label | Level | Field
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultPicture:
+    """A picture of the result.
+
+    Attributes
+    ----------
+    key : str
+        Its name in programs.
+    title : str
+        Above it.
+    caption : str
+        What it says, in one or two sentences.
+    labels : (str, str)
+        Of the axes; empty for a picture in mm from above, whose y points down.
+    marks : tuple
+        From the back to the front.
+    """
+
+    key: str
+    title: str
+    caption: str
+    labels: tuple[str, str]
+    marks: tuple[Mark, ...]
+
+
+def result_pictures(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
+    """Return the pictures that show how good a calibration is, and where.
+
+    Parameters
+    ----------
+    c : Calibration
+        The calibration.
+    run : CalibrationRun or None
+        The results of its stages; without them, the pictures of single presses are left out.
+    """
+    if isinstance(c.data, ClosedSensor):
+        pictures = [_uncertainty(c)]
+        names, errors = tuple(ball[0] for ball in c.data.balls), np.full(len(c.data.balls), np.nan)
+        if run is not None:
+            presses = run.results[CLOSED_BALLS].result.presses
+            errors = np.array([press.held_out.cap_ratio - 1.0 for press in presses])
+            pictures.insert(0, _bars(c, "held_out_cap_percent", names, errors))
+        rings = tuple((x, y, contact) for _, x, y, contact, _ in c.data.balls)
+        return (*pictures, _plan(names, rings))
+    data = c.data_of(OpenSensor)
+    joint: RefinementStageResult | None = None if run is None else run.results.get(JOINT)
+    stated = () if data.full is None or data.full.scale_sd is None else (_uncertainty(c),)
+    leds, factor = _leds(data)
+    about = f"Ellipses: two standard deviations of the LEDs, drawn {factor:.0f} times as large."
+    if run is None or joint is None or joint.checked is None:
+        return (*stated, _plan((), (), leds, about))
+    balls, checked = joint.refined.balls, joint.checked
+    bars = _bars(c, "ball_height_error_percent", joint.refined.ball_names, checked.height_errors)
+    rings = tuple(
+        (*ball.centre_mm, math.sqrt(ball.depth_mm * (2.0 * ball.radius_mm - ball.depth_mm)))
+        for ball in balls
+    )
+    plan = _plan(joint.refined.ball_names, rings, (*_boards(run), *leds), f"{BOARDS} {about}")
+    return bars, *stated, plan, _left(data, checked.left, checked.step)
+
+
+def _bars(c: Calibration, key: str, names: Sequence[str], errors: Float64Array) -> ResultPicture:
+    """Return the relative errors of the presses, worst first, with the limit of a figure."""
+    figures = (f for table in c.quality.values() for f in table.figures if f.key == key)
+    limit = next((f.warn_limit for f in figures if f.warn_limit is not None), math.inf)
+    known = ((100.0 * abs(e), PurePath(n).stem) for n, e in zip(names, errors, strict=True))
+    worst_first = sorted(((e, n) for e, n in known if math.isfinite(e)), reverse=True)
+    odd = [n for e, n in worst_first if e > limit]
+    values, stems = zip(*worst_first, strict=True) if worst_first else ((), ())
+    roles: tuple[Role, ...] = tuple("warn" if name in odd else "accent" for name in stems)
+    marks: list[Mark] = [Bars(stems, values, roles)]
+    if math.isfinite(limit):
+        marks.append(Level(limit, f"limit {limit:g} %"))
+    caption = "All are within the limit."
+    if odd:
+        caption = f"Beyond the limit: {', '.join(odd)}. Check the diameter, and press it again."
+    return ResultPicture(
+        "balls", "Height error of each ball press (%)", caption, ("", "%"), tuple(marks)
+    )
+
+
+def _uncertainty(c: Calibration) -> ResultPicture:
+    """Return what the uncertainty of a measured object will be, by its depth."""
+    shape, size_mm = ("ball", BALL_MM) if isinstance(c.data, ClosedSensor) else ("cylinder", 5.0)
+    sds = [expected_sd(c, shape, size_mm, float(depth_mm)) for depth_mm in DEPTHS_MM]
+    height, across = (
+        100.0 * COVERAGE * np.array([sd[name] for sd in sds])
+        for name in ("height_mm", "diameter_mm")
+    )
+    height /= DEPTHS_MM
+    across /= size_mm
+    tolerance = PAPER_PERCENT["depth"]
+    decides = DEPTHS_MM[height < tolerance]
+    caption = f"No height can be judged by a tolerance of {tolerance:g} %."
+    if decides.size:
+        caption = (
+            f"Heights can be judged by a tolerance of {tolerance:g} % from {decides[0]:.2g} to "
+            f"{decides[-1]:.2g} mm deep; diameters are known within {across.max():.2g} %."
+        )
+    marks = (
+        Line(DEPTHS_MM, across, "green", "diameter"),
+        Line(DEPTHS_MM, height, "accent", "height"),
+        Level(tolerance, f"tolerance {tolerance:g} %"),
+    )
+    title = f"Expected uncertainty of a {shape} of {size_mm:g} mm, by its depth"
+    labels = "depth (mm)", "U, k = 2 (%)"
+    return ResultPicture("uncertainty", title, caption, labels, marks)
+
+
+def _plan(
+    names: Sequence[str],
+    rings: Sequence[tuple[float, float, float]],
+    more: Sequence[Mark] = (),
+    about: str = "",
+) -> ResultPicture:
+    """Return the contacts from above, with what else is known of the sensor."""
+    marks: list[Mark] = list(more)
+    for name, (x, y, radius) in zip(names, rings, strict=True):
+        marks.append(_ring(x, y, radius * np.eye(2), "accent"))
+        if len(rings) <= MOST_NAMES:
+            marks.append(Label(x, y, PurePath(name).stem.removeprefix("ball_"), "accent"))
+    caption = f"Circles: contacts of the balls. {about}".rstrip()
+    return ResultPicture("plan", "Where the sensor was measured", caption, ("", ""), tuple(marks))
+
+
+def _ring(x: float, y: float, axes: Float64Array, role: Role) -> Line:
+    """Return an ellipse by its half axes, the columns of a matrix (2, 2)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 49)
+    points = axes @ np.stack([np.cos(angle), np.sin(angle)])
+    return Line(x + points[0], y + points[1], role)
+
+
+def _leds(data: OpenSensor) -> tuple[tuple[Mark, ...], float]:
+    """Return the LEDs with their uncertainty, and how many times larger this is drawn."""
+    full = data.full
+    if full is None:
+        return (), 1.0
+    sd_mm = COVERAGE * full.led_sd_mm[:, :2]
+    factor = max(float(f"{ELLIPSE_MM / max(float(sd_mm.max()), 1e-9):.0e}"), 1.0)
+    marks: list[Mark] = []
+    for (x, y), sd, role in zip(
+        full.led_positions_mm[:, :2].tolist(), sd_mm, LED_ROLES, strict=True
+    ):
+        marks.append(_ring(x, y, np.diag(factor * sd), role))
+        text = f"\N{PLUS-MINUS SIGN}{1e3 * sd.max():.0f} \N{MICRO SIGN}m"
+        marks.append(Label(x, y + 2.0 * ELLIPSE_MM, text, role))
+    return tuple(marks), factor
+
+
+def _boards(run: CalibrationRun) -> Iterator[Line]:
+    """Return the outline of the corners of each board on the top surface."""
+    camera, top = run.results[LENS].camera, run.results[TOP_POSE].pose
+    for view in top.views:
+        if not view.used or view.board is None:
+            continue
+        columns = view.board.board.inner_corners[0]
+        at = np.array([0, columns - 1, -1, -columns, 0])
+        rays = camera.directions(view.board.corners_px[at])
+        along = rays @ np.array(top.plane.normal_camera)
+        points = rays * (top.plane.distance_mm / along)[:, None]
+        x, y, _ = top.plane.to_sensor(points).T
+        yield Line(x, y, "muted")
+
+
+def _left(data: OpenSensor, left: Float32Array, step: int) -> ResultPicture:
+    """Return the map of the light that no surface explains where balls were pressed."""
+    grid, percent = data.table.grid, 100.0 * left
+    seen = percent[np.isfinite(percent)]
+    reach = max(float(np.percentile(np.abs(seen), 99.0)), 0.1) if seen.size else 1.0
+    half = 0.5 * grid.pitch_mm
+    rows, columns = (step * n for n in percent.shape)
+    x, y = float(grid.x_mm[0]) - half, float(grid.y_mm[0]) - half
+    edges = x, x + columns * grid.pitch_mm, y, y + rows * grid.pitch_mm
+    rms = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
+    caption = f"Of the untouched membrane's light, where balls were pressed; {rms:.2g} % (rms)."
+    title = "Light that the model does not explain (%)"
+    return ResultPicture("left", title, caption, ("", ""), (Field(percent, edges, reach),))
