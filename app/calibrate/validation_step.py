@@ -28,13 +28,20 @@ from app.widgets.layout import hbox, vbox
 from app.widgets.text_roles import named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, as_input_error, error_message
-from gelpolight_core.base.finding import Finding, Verdict
+from gelpolight_core.base.finding import Finding
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import read_calibration
 from gelpolight_core.lab.evaluation_run import MeasurementOrReason, measure_press
 from gelpolight_core.lab.press_folder import FOLDER, add_presses, leave_out
 from gelpolight_core.lab.reference_press import ReferencePress, listed_presses
-from gelpolight_core.lab.validation_trial import is_recordable, object_name, press_lines, validate
+from gelpolight_core.lab.validation_trial import (
+    is_recordable,
+    object_name,
+    press_lines,
+    refuse_source,
+    validate,
+    what_decides,
+)
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.reference_object import LENGTHS, SHAPES, ReferenceObject
@@ -99,8 +106,9 @@ class ValidationStep(Step):
         self.verdict = named_label("validation.verdict", "All presses together")
         self.calibration = named_label("validation.calibration", "Calibration to validate")
         listed = QWidget()
+        self.passed = named_label("validation.passed", "Validated", bold=1.0, role="pass")
         parts = self.next_press, self.table, self.verdict, self.result, self.calibration
-        vbox(*parts, of=listed, margins=0)
+        vbox(self.passed, *parts, of=listed, margins=0)
         self.keep = push_button("validation.keep", "&Record this validation", self.record)
         set_property(self.keep, "primary", True)
         self.own = (
@@ -133,11 +141,11 @@ class ValidationStep(Step):
             return "empty", "Not validated yet"
         if not self.model.saved:
             return "stale", "The captures or corrections have changed since the validation"
+        word, largest = WORDS[validation.verdict], f"{validation.largest_percent:.2g} %"
         if validation.passed:
-            return "pass", "Validated"
-        if validation.verdict is Verdict.WARN:
-            return "warn", "The uncertainty is too large to decide"
-        return "fail", "The last validation failed"
+            in_use = self.context.workspace.in_use == self.model.saved_path
+            return "pass", f"{word}: {largest}. {'In use' if in_use else 'Not in use'}."
+        return validation.verdict.value, f"{word}. {what_decides(validation.comparisons)}".strip()
 
     def number(self) -> Finding | None:
         """Return the largest error of the recorded validation."""
@@ -186,6 +194,9 @@ class ValidationStep(Step):
         self.calibration.setVisible(not present)
         self.calibration.setText(text)
         set_text_role(self.calibration, "" if present else "warn")
+        state, sentence = self.state()
+        self.passed.setText(sentence)
+        self.passed.setVisible(state == "pass")
         if path != self._reconstructor[0]:
             self._follow()
         elif self.model.page.step is self:
@@ -337,9 +348,10 @@ class ValidationStep(Step):
         set_text_role(self.result, role)
         self.verdict.setVisible(trial is not None and bool(trial.comparisons))
         if trial is not None and trial.comparisons:
-            worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %"
+            advice = what_decides(trial.comparisons)
+            worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %. {advice}"
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
-            self.verdict.setText(worst if recordable else doubtful)
+            self.verdict.setText(worst.strip() if recordable else doubtful)
             set_text_role(self.verdict, trial.verdict.value if recordable else "warn")
         self.model.update_page(below=self.progress_line())
 
@@ -376,7 +388,13 @@ class ValidationStep(Step):
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, of the object that its folder states, if any."""
+        calibration = self.model.saved_path
+        if calibration is None:
+            self._refuse(self.calibration.text())
+            return
         with self._errors():
+            if (summary := read_entry(calibration).summary) is not None:
+                refuse_source(path, summary.sources)
             frame = read_raw(path)
             truths = {press.file: press.truth for press in listed_presses(path.parent)}
             truth = truths.get(path.name)
@@ -415,6 +433,7 @@ class ValidationStep(Step):
         def work(_progress: object) -> tuple[Reconstructor, MeasurementOrReason, HeightMap | None]:
             reconstructor = present or Reconstructor(read_calibration(path))
             try:
+                refuse_source(image, reconstructor.calibration.provenance.sources.values())
                 return reconstructor, *measure_press(image, truth, reconstructor)
             except Exception as error:  # what is wrong with a press is its result
                 if as_input_error(error) is None:

@@ -11,7 +11,7 @@ from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.base.safe_reading import cannot_read, parse_time
 from gelpolight_core.calibration.manifest import CalibrationSummary, read_summary
-from gelpolight_core.session.validation import Validation
+from gelpolight_core.session.validation import WORDS, Validation
 
 ENDING = ".gplcal"
 UNLISTED = f"*{ENDING}"
@@ -69,7 +69,9 @@ class CalibrationEntry:
         """Reliability of the calibration as a word or two, with a colour role."""
         if self.broken or self.failed:
             return ("broken" if self.broken else "failed"), "fail"
-        return ("validated", "pass") if self.validated else ("not validated", "warn")
+        trial = self.validation
+        word = "not validated" if trial is None else WORDS[trial.verdict].lower()
+        return word, "pass" if self.validated else "warn"
 
     @property
     def created(self) -> datetime | None:

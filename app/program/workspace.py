@@ -283,8 +283,11 @@ class Workspace:
         Raises
         ------
         InputError
-            If the file is broken or cannot be copied.
+            If the file is no calibration, is broken or cannot be copied.
         """
+        if source.suffix.lower() != ENDING:
+            text = f"This is not a calibration (*{ENDING})"
+            raise InputError(text, source.name, Remedy.CHOOSE_FILE)
         summary = read_summary(source)
         for path in self.sensor_folder(summary.serial).glob(f"[!.]*{ENDING}"):
             entry = read_entry(path)

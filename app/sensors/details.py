@@ -26,12 +26,16 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
+from gelpolight_core.lab.validation_trial import what_decides
+from gelpolight_core.session.validation import WORDS
 
 ItemT = TypeVar("ItemT")
 
 
-TITLES = "", "Sensor", "Created", "Age", "Verdict", "Validation", "Model", "Name"
+TITLES = "", "Sensor", "Verdict", "Validation", "Created", "Age", "Model", "Name"
 """Titles of the columns of :func:`cells_of`."""
+SORTED = Verdict.PASS, Verdict.WARN, Verdict.FAIL
+"""The verdicts in the order of sorted rows."""
 
 
 def session_cells(entry: SessionEntry) -> tuple[TableCell, ...]:
@@ -50,19 +54,14 @@ def cells_of(entry: CalibrationEntry, now: datetime, oldest_days: float) -> tupl
     if entry.summary is None:
         broken = TableCell("Broken", "broken", "fail", entry.broken, key=3)
         name = TableCell(entry.name, tip=str(entry.path))
-        return (*first, nothing, nothing, broken, nothing, nothing, name)
+        return (*first, broken, nothing, nothing, nothing, nothing, name)
     verdict = entry.summary.verdict
     return (
         *first,
+        TableCell(verdict.word, verdict.value, verdict.value, key=SORTED.index(verdict)),
+        validated_cell(entry),
         made_cell(entry),
         age_cell(entry.age_days(now), oldest_days),
-        TableCell(
-            verdict.word,
-            verdict.value,
-            verdict.value,
-            key=("pass", "warn", "fail").index(verdict.value),
-        ),
-        validated_cell(entry),
         TableCell(entry.summary.model),
         TableCell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
     )
@@ -94,12 +93,13 @@ def age_cell(age_days: float | None, oldest_days: float) -> TableCell:
 def validated_cell(entry: CalibrationEntry) -> TableCell:
     """Return the validation state of a calibration."""
     trial = entry.validation
-    if entry.validated and trial is not None:
-        tip = f"{trial.indenter}, {trial.when}"
-        return TableCell("validated", "validated", "pass", tip, key=2)
-    if trial is not None:
-        return TableCell("failed", "fail", "fail", trial.indenter, key=1)
-    return TableCell("not validated", "", "muted", key=0)
+    if trial is None:
+        return TableCell("not validated", "", "muted", key=len(SORTED))
+    verdict, tip = trial.verdict, f"{trial.indenter}, {trial.when}"
+    # The title of the column is the first word of some.
+    word = WORDS[verdict].lower().removeprefix("validation ")
+    sign = "validated" if trial.passed else verdict.value
+    return TableCell(word, sign, verdict.value, tip, key=SORTED.index(verdict))
 
 
 def _in_use(entry: CalibrationEntry) -> TableCell:
@@ -304,7 +304,9 @@ def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> st
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""
     trial = entry.validation
-    none = ["Not validated: press an object of known size to validate it"]
+    validation = ["Not validated: press an object of known size to validate it"]
+    if trial is not None:
+        validation = [*trial.lines(), *filter(None, (what_decides(trial.comparisons),))]
     lines = [
         f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
         f"Made {made_cell(entry).text} {operator} from session {summary.session}, "
@@ -312,4 +314,4 @@ def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> st
         uses,
         summary.accepted and f"Used although it failed: {summary.accepted}",
     ]
-    return "\n".join((*filter(None, lines), *(none if trial is None else trial.lines())))
+    return "\n".join((*filter(None, lines), *validation))

@@ -70,6 +70,8 @@ class CalibrationSummary:
         Identity of the camera. Empty if unknown.
     validation : Validation or None
         On an object of known size, passed or not.
+    sources : frozenset of str
+        SHA-256 of each file that it was made from.
     """
 
     identity: str
@@ -85,6 +87,7 @@ class CalibrationSummary:
     accepted: str = ""
     camera: str = ""
     validation: Validation | None = None
+    sources: frozenset[str] = frozenset()
 
     @property
     def verdict(self) -> Verdict:
@@ -147,6 +150,7 @@ def _summarise(manifest: dict[str, Any], path: Path) -> CalibrationSummary:
         image_size=(int(width), int(height)),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         validation=validation_in(manifest, path),
+        sources=frozenset(map(multiline_text, provenance.get("sources", {}).values())),
     )
 
 

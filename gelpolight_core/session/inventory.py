@@ -17,6 +17,8 @@ from .file_hashes import file_hash
 DESCRIPTION = "session.toml"
 IN_PLACE = "in_place"
 """Table of session.toml that a closed sensor has, and no other."""
+SYSTEM_FILES = "thumbs.db", "ehthumbs.db", "desktop.ini"
+"""Files that Windows writes into any folder, in lower case. Those of other systems are hidden."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class StoredImage:
 
 
 class StageFiles(NamedTuple):
-    """The files of a stage's folder in the order of their names, hidden ones left out."""
+    """The files of a stage's folder by their names, without hidden and system files."""
 
     images: tuple[StoredImage, ...]
     others: tuple[Path, ...]
@@ -136,5 +138,6 @@ def _listed(folder: Path, before: Mapping[StoredImage, StoredImage]) -> StageFil
     """Return the files of a folder. Images that are as before keep what is known of them."""
     paths, others = files_in(folder)
     return StageFiles(
-        tuple(before.get(image, image) for image in map(StoredImage.of, paths)), others
+        tuple(before.get(image, image) for image in map(StoredImage.of, paths)),
+        tuple(path for path in others if path.name.lower() not in SYSTEM_FILES),
     )

@@ -23,7 +23,7 @@ VERSION = 1
 ENDING = ".validation.json"
 WORDS = {
     Verdict.PASS: "Validated",
-    Verdict.WARN: "Not validated",
+    Verdict.WARN: "Validation not decidable",
     Verdict.FAIL: "Validation failed",
 }
 """Whether a calibration is validated, from the worst decision on a length."""

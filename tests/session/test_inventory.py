@@ -26,6 +26,14 @@ def test_a_file_is_looked_into_again_only_after_it_has_changed(tmp_path):
     assert after[1].sha256 != hashes[1]
 
 
+def test_files_that_a_system_writes_into_a_folder_count_as_nothing(tmp_path):
+    (tmp_path / "balls").mkdir()
+    for name in ("Thumbs.db", "desktop.ini", ".DS_Store", "notes.txt"):
+        (tmp_path / "balls" / name).write_bytes(b"x")
+    others = SessionInventory(tmp_path).stage("balls").others
+    assert [path.name for path in others] == ["notes.txt"]
+
+
 def test_an_unreadable_or_absent_file_is_no_size_and_an_absent_stage_is_empty(tmp_path):
     (tmp_path / "balls").mkdir()
     (tmp_path / "balls" / "a.png").write_bytes(b"x")

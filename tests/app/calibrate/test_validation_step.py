@@ -142,20 +142,50 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     technician.rest()
 
 
+@pytest.mark.parametrize("inside", [True, False])
+def test_an_image_of_the_calibration_is_no_press_of_its_validation(
+    technician, computed_project, tmp_path, inside
+):
+    save(technician, computed_project(), tmp_path / "workspace")
+    step, ball = technician.wizard.at("validation"), technician.session / "balls" / "ball_01.png"
+    step.show_known(ReferenceObject("ball", 5.0))
+    if inside:  # another program copied it
+        step.add()
+        shutil.copy(ball, technician.session / "presses" / step._presses[0].file)
+        step._follow()
+        technician.until(lambda: step._outcomes)
+        assert "used for the calibration" in step.result.text()
+    else:
+        renamed = Path(shutil.copy(ball, tmp_path / "cylinder.png"))
+        step.import_press(renamed)
+        assert "used for the calibration" in technician.wizard.model.page.notice[0]
+        assert not step._presses
+    assert not step.keep.isEnabled()
+    technician.wizard.model.jobs.cancel()
+    technician.rest()
+
+
 def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
     technician, computed_project, tmp_path
 ):
     path = save(technician, computed_project(), tmp_path / "workspace")
     model, panel = technician.wizard.model, technician.wizard.panel
     passed = Quantity("height", 1.0, truth=1.0, limit_percent=8.0)
-    for identity, state in (("another", "empty"), (read_summary(path).identity, "pass")):
-        trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,))
+    unsure, identity = replace(passed, sd=0.05), read_summary(path).identity
+    for named, height, state in (
+        ("another", passed, "empty"), (identity, unsure, "warn"), (identity, passed, "pass"),
+    ):  # fmt: skip
+        trial = Validation(named, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (height,))
         write_validation(trial, path)
         model.changed.emit()
         assert technician.state("validation") == state
+        if state == "warn":
+            assert "tolerance of 10 % can be decided" in model.page.sentence
     context = technician.page.context
     context.requests.calibrations_changed.emit()
     assert context.workspace.in_use == path
+    technician.wizard.go_to("validation")
+    assert technician.see("validation.passed").text() == "Validated: 0 %. In use."
     assert [button.text() for button in panel.buttons] == ["&Inspect", "M&easure", "&Report…"]
     context.workspace.use(None)
     context.requests.calibrations_changed.emit()

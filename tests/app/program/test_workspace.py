@@ -22,6 +22,7 @@ from gelpolight_core.session.validation import FORMAT, VERSION, Validation, vali
 
 GOOD = Quantity("height", 1.02, truth=1.0, limit_percent=8.0)
 BAD = Quantity("diameter", 5.6, truth=5.0, limit_percent=5.0)
+OPEN = Quantity("diameter", 5.1, 0.15, truth=5.0, limit_percent=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +115,14 @@ def test_a_broken_file_is_listed_with_its_reason(workspace, source):
     assert len(workspace.entries()) == 3
 
 
+def test_a_file_of_another_kind_is_refused_by_its_name(workspace, tmp_path):
+    photo = tmp_path / "photo.png"
+    photo.write_bytes(b"\x89PNG")
+    with pytest.raises(InputError, match="not a calibration") as refusal:
+        workspace.import_calibration(photo)
+    assert refusal.value.where == photo.name
+
+
 def test_a_removed_calibration_leaves_with_its_validation_and_an_older_trash_stays(
     workspace, source
 ):
@@ -162,11 +171,16 @@ def test_the_folder_can_be_moved(workspace, source, tmp_path):
 
 def test_only_a_passed_trial_validates(workspace, source):
     place = workspace.import_calibration(source)
-    for comparisons in ((BAD,), (GOOD, BAD), ()):
+    for word, comparisons in (
+        ("validation failed", (BAD,)),
+        ("validation failed", (GOOD, BAD)),
+        ("validation failed", ()),
+        ("validation not decidable", (GOOD, OPEN)),
+    ):
         write_validation(trial(place, *comparisons), place)
         entry = read_entry(place)
         assert entry.validation is not None
-        assert not entry.validated
+        assert not entry.validated and entry.state == (word, "warn")
     write_validation(trial(place, GOOD), place)
     entry = read_entry(place)
     assert entry.validation == trial(place, GOOD)

@@ -1,5 +1,6 @@
 """The Sensors page: the library as a technician sees and uses it."""
 
+import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from report_pdf import report_data
 from app.program.calibration_entries import read_entry
 from app.program.context import AppContext
 from app.program.preferences import WarningLimits
-from app.sensors.details import cells_of
+from app.sensors.details import TITLES, cells_of
 from app.sensors.page import SensorsPage
 from app.widgets.dialog import QuestionDialog
 from app.widgets.quality_table import QualityTableWidget
@@ -203,9 +204,25 @@ def test_an_old_calibration_is_marked(source):
     limit = WarningLimits().age_days
     young = cells_of(entry, made + timedelta(days=limit - 1), limit)
     old = cells_of(entry, made + timedelta(days=limit + 1), limit)
-    assert young[3].icon == ""
-    assert old[3].icon == "stale"
-    assert "calibrate again" in old[3].tip
+    assert young[5].icon == ""
+    assert old[5].icon == "stale"
+    assert "calibrate again" in old[5].tip
+
+
+@pytest.mark.parametrize(
+    ("sd", "word", "role"),
+    [(0.001, "validated", "pass"), (0.05, "not decidable", "warn"), (None, "failed", "fail")],
+)
+def test_each_result_of_a_validation_has_its_word_and_colour_behind_the_sensor(
+    source, tmp_path, sd, word, role
+):
+    path = Path(shutil.copy(source, tmp_path))
+    height = Quantity("height", 1.02 if sd else 1.2, sd, 1.0, 8.0)
+    identity = scene.calibration().identity
+    write_validation(Validation(identity, "2026-03-01T12:00:00+00:00", "", "x", (height,)), path)
+    cells = cells_of(read_entry(path), datetime.now(UTC), 365.0)
+    assert TITLES[1:4] == ("Sensor", "Verdict", "Validation")
+    assert (cells[3].text, cells[3].role) == (word, role)
 
 
 def session_of(context: AppContext, serial: str) -> Path:
