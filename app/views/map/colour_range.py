@@ -1,4 +1,4 @@
-"""The depths at the ends of the colours: round numbers that do not jump between frames."""
+"""The depths at the ends of the colours: a few that do not jump between frames and presses."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from app.widgets.units import round_up
 
+HEADROOM = 1.2
+"""Share of an end to a round depth, around which presses scatter: they have the same colours."""
 LEAST_MM = 0.02
-"""Smallest upper end, so that the noise of the bare membrane is not shown as depth."""
+"""Least depth for the upper end, so that the noise of the bare membrane is not shown as depth."""
 SHRINK_BELOW = 0.4
 """A depth below this share of its end is small: the range may shrink."""
 SHRINK_AFTER_S = 2.0
@@ -19,9 +21,9 @@ LOW_SHARE = 0.1
 class ColourRange:
     """The automatic range of the colours over a sequence of depth maps.
 
-    Each end is 0 or 1, 2, 5 times a power of ten. It grows at once when the depth goes beyond it.
-    It shrinks after the depth was small for `SHRINK_AFTER_S` during a press. Without a press it
-    stays, so that the next press has the colours of the last one.
+    Each end is 0, or 1, 2, 5 times a power of ten times `HEADROOM`. It grows as soon as the depth
+    goes beyond it. It shrinks after the depth was small for `SHRINK_AFTER_S` of a press. Without
+    a press it stays, so that the next press has the colours of the last one.
     """
 
     def __init__(self) -> None:
@@ -76,15 +78,19 @@ class RangeLimitSmoother:
         passed_s = 0.0 if self._last_s is None else max(time_s - self._last_s, 0.0)
         self._last_s = time_s
         if value >= SHRINK_BELOW * self._end:
-            self._end = max(self._end, round_up(value))
+            self._end = max(self._end, _end_for(value))
             self._restart()
         elif may_shrink:
             self._small_s += passed_s
             self._largest = max(self._largest, value)
             if self._small_s >= SHRINK_AFTER_S:
-                self._end = round_up(self._largest)
+                self._end = _end_for(self._largest)
                 self._restart()
         return self._end
+
+
+def _end_for(value: float) -> float:
+    return HEADROOM * round_up(value / HEADROOM)
 
 
 def extremes_mm(depth_mm: NDArray[np.float32]) -> tuple[float, float]:

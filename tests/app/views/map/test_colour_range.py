@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from app.views.map.colour_range import LEAST_MM, SHRINK_AFTER_S, ColourRange
+from app.views.map.colour_range import HEADROOM, LEAST_MM, SHRINK_AFTER_S, ColourRange
 
 FRAME_S = 1.0 / 30.0
 
@@ -33,28 +33,29 @@ def _run(
 
 @pytest.mark.parametrize(
     ("depth_mm", "high_mm"),
-    [(0.0, LEAST_MM), (0.03, 0.05), (0.5, 0.5), (0.51, 1.0), (1.3, 2.0), (2.1, 5.0)],
+    [(0.0, 0.024), (0.03, 0.06), (0.48, 0.6), (0.52, 0.6), (0.98, 1.2), (1.02, 1.2), (2.5, 6.0)],
 )
-def test_the_first_press_has_the_next_round_range(depth_mm, high_mm):
+def test_presses_of_about_the_same_round_depth_have_the_same_range(depth_mm, high_mm):
     assert ColourRange().update(_press(depth_mm), 0.0) == (0.0, pytest.approx(high_mm))
+    assert high_mm >= LEAST_MM
 
 
 def test_the_range_stays_while_nothing_is_pressed():
     colours = ColourRange()
     colours.update(_press(0.9), 0.0)
     shown, now_s = _run(colours, _press(0.0), 60.0, 0.0)
-    assert shown[1] == pytest.approx(1.0)
+    assert shown[1] == pytest.approx(1.2)
     shown, _ = _run(colours, _press(0.8), 1.0, now_s)
-    assert shown[1] == pytest.approx(1.0)
+    assert shown[1] == pytest.approx(1.2)
 
 
 def test_a_lighter_press_has_a_smaller_range_after_a_while_and_not_before():
     colours = ColourRange()
     colours.update(_press(0.9), 0.0)
     shown, now_s = _run(colours, _press(0.15), 0.9 * SHRINK_AFTER_S, 0.0)
-    assert shown[1] == pytest.approx(1.0)
+    assert shown[1] == pytest.approx(1.2)
     shown, _ = _run(colours, _press(0.15), 0.2 * SHRINK_AFTER_S, now_s)
-    assert shown[1] == pytest.approx(0.2)
+    assert shown[1] == pytest.approx(0.24)
 
 
 @given(st.lists(st.floats(0.0, 4.0), min_size=2, max_size=40))
@@ -62,7 +63,8 @@ def test_all_depths_have_colours_and_the_range_changes_rarely(depths):
     colours = ColourRange()
     shown = [colours.update(_press(d), k * FRAME_S)[1] for k, d in enumerate(depths)]
     assert all(
-        d <= high * (1.0 + 1e-6) and float(f"{high:.0e}") == pytest.approx(high)
+        d <= high * (1.0 + 1e-6)
+        and float(f"{high / HEADROOM:.0e}") == pytest.approx(high / HEADROOM)
         for d, high in zip(depths, shown, strict=True)
     )
     # These are less than two seconds of frames: too short a time for a smaller range.
