@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from PySide6.QtCore import QMimeData
@@ -12,6 +13,9 @@ from gelpolight_core.output.recording.recording_format import ENDING as RECORDIN
 from .calibration_entries import ENDING
 from .session_entries import DESCRIPTION, is_session
 from .settings import AppSettings
+
+ENDINGS = re.compile(r"\*(\.[\w.]+)")
+"""Endings of file names in patterns as in Qt."""
 
 
 def sort_dropped(paths: tuple[Path, ...]) -> tuple[list[Path], list[Path], list[Path]]:
@@ -73,10 +77,19 @@ def ask_several(
 def ask_save(
     parent: QWidget, settings: AppSettings, kind: str, title: str, name: str, patterns: str
 ) -> Path | None:
-    """Let the user choose a file to write, `name` is proposed. See :func:`ask_open`."""
+    """Let the user choose a file to write, `name` is proposed. See :func:`ask_open`.
+
+    A name without one of the endings in `patterns` gets that of the chosen kind.
+    """
     proposed = str(settings.folder(kind) / name)
-    file, _ = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
-    return _kept(settings, kind, file)
+    file, pattern = QFileDialog.getSaveFileName(parent, title, proposed, patterns)
+    path = _kept(settings, kind, file)
+    if path is None or path.name.lower().endswith(tuple(ENDINGS.findall(patterns.lower()))):
+        return path
+    path = path.with_name(path.name + ENDINGS.findall(pattern or patterns)[0])
+    if path.exists():  # the dialog asks before it replaces a file
+        return ask_save(parent, settings, kind, title, path.name, patterns)
+    return path
 
 
 def ask_folder(parent: QWidget, settings: AppSettings, kind: str, title: str) -> Path | None:

@@ -96,6 +96,7 @@ class TimeChart(QWidget):
         self._plot.clear()
         apply_theme(self._plot)
         self._legend.setLabelTextColor(theme.colour("text"))
+        self._legend.setBrush(theme.colour("base"))  # a limit line does not cross its texts
         self._plot.addItem(pg.InfiniteLine(0.0, angle=0, pen=theme.colour("line")))
         times = sorted({time for series in self.shown for time in series.times_s})
         self._days.show_times(times)
