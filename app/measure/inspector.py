@@ -23,7 +23,6 @@ from gelpolight_core.base.user_name import user_name
 from gelpolight_core.session.reference_object import LENGTHS, ReferenceObject
 
 from .press_state import PressState, ResultRow
-from .record_table import VERDICTS
 
 FIELD_PX = 74
 AGAIN = "\0again"
@@ -228,12 +227,13 @@ class Inspector(QWidget):
 
     def show_state(self, state: PressState) -> None:
         """Show what was measured."""
-        self.title.setText(state.title or ("No tool" if state.frozen else "Live"))
-        self.image.setText(state.image or "Press Space to freeze the image.")
-        word, role = VERDICTS.get(state.verdict, ("", ""))
-        self.verdict.setVisible(bool(word))
-        self.verdict.setText(word)
-        set_background_role(self.verdict, role)
+        live = ("Live", "Press Space to freeze the image.") if state.freezable else ("No depth", "")
+        title, about = ("No tool", state.image) if state.frozen else live
+        self.title.setText(state.title or title)
+        self.image.setText(about)
+        self.verdict.setVisible(bool(state.verdict))
+        self.verdict.setText(state.verdict)
+        set_background_role(self.verdict, state.verdict_role)
         self.table.setText(_table(state.rows))
         self.budget.setVisible(bool(state.budget))
         self.sources.setText(_lines(state.budget))

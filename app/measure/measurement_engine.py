@@ -23,6 +23,7 @@ from app.views.map.quantities import depth_scale, difference_scale
 from app.views.map.shading import map_image
 from app.views.surface.display_surface import surface_of
 from gelpolight_core.base.errors import InputError, Remedy, error_message
+from gelpolight_core.base.finding import finding_from_error
 from gelpolight_core.image.linear_image import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.measurement.fit_residual import fit_residual
@@ -249,7 +250,7 @@ def apply_tool(tool: Tool, heightmap: HeightMap) -> ToolOutcome:
     try:
         return ToolOutcome(with_map_findings(tool.apply(heightmap), heightmap))
     except InputError as error:
-        return ToolOutcome(refused=str(error))
+        return ToolOutcome(refused=finding_from_error(error).line)
     except Exception as error:  # a tool that fails must not remove the figures of the others
         _LOG.exception("The tool %s failed", tool.name)
         return ToolOutcome(refused=error_message(error))

@@ -279,15 +279,11 @@ class MeasurementModel(QObject):
 
     def _on_proposal(self, proposal: DetectedShape | None) -> None:
         if proposal is None:
-            self.answer = (
-                "No ball, cylinder or cuboid was found. Press one, or use the other tools."
-            )
+            self.answer = "No ball, cylinder or cuboid was found. Press one, or use other tools."
             return
         if len(proposal.candidates) > 1:
             names = " and ".join(palette_entry(shape).label for shape in proposal.candidates)
-            self.answer = (
-                f"The object is not unique: {names} fit equally well. Choose the correct tool."
-            )
+            self.answer = f"The object is not unique: {names} fit equally well. Choose one of them."
         if self._sheet.get(self._detected) is None:
             self._detected = self.add(make_tool(TOOLS[proposal.candidates[0]], (proposal.at_mm,)))
         else:

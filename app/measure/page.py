@@ -29,7 +29,7 @@ from gelpolight_core.session.reference_object import ReferenceObject, check_name
 
 from .press_view import PressView
 from .record_table import shape_label
-from .records_model import RecordsModel
+from .records_model import RecordsModel, number_of
 from .records_view import RecordsView
 
 NEW = ReferenceObject("cylinder", 5.0, name="New cylinder")
@@ -122,6 +122,7 @@ class MeasurePage(QWidget):
         self.press_view = PressView(
             self.jobs,
             on_save=self.keep,
+            is_saved=lambda record: number_of(record, self.book.records) is not None,
             on_edit=self.edit_objects,
             on_records=lambda: self.tabs.setCurrentWidget(self.results),
             context=context,
@@ -130,13 +131,14 @@ class MeasurePage(QWidget):
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
         self.book = RecordsModel(context=context, parent=self)
-        self.results = RecordsView(self.book, context=context)
+        self.results = RecordsView(self.book, on_open=self._try_file, context=context)
         self.tabs.addTab(self.press_view, "Measure")
         self.tabs.addTab(self.results, "Records")
         vbox(self.tabs, of=self, margins=0)
         self._shown = False
         self.tabs.currentChanged.connect(lambda _index: self._on_tab())
         self.book.changed.connect(self._show_count)
+        self.book.changed.connect(self.press_view.refresh)
         self.book.noticed.connect(self._on_problem)
         self.jobs.refused.connect(self._on_problem)
         context.requests.preferences_changed.connect(self._show_again)
@@ -212,17 +214,17 @@ class MeasurePage(QWidget):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept images and recordings. The window handles everything else."""
-        paths = dropped_paths(event.mimeData())
-        if any(path.suffix.lower() in (*SUFFIXES, RECORDING) for path in paths):
+        if _usable_paths(event):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
         """Open the first of them."""
-        paths = dropped_paths(event.mimeData())
-        accepted = [path for path in paths if path.suffix.lower() in (*SUFFIXES, RECORDING)]
-        self.tabs.setCurrentWidget(self.press_view)
-        self.press_view.try_file(accepted[0])
+        self._try_file(_usable_paths(event)[0])
         event.acceptProposedAction()
+
+    def _try_file(self, path: Path) -> None:
+        self.tabs.setCurrentWidget(self.press_view)
+        self.press_view.try_file(path)
 
     # The records
 
@@ -272,3 +274,9 @@ class MeasurePage(QWidget):
             before.refuse_changed(list_file)
             write_indenters(objects, self.context.workspace.folder)
         self._read_objects()
+
+
+def _usable_paths(event: QDropEvent) -> list[Path]:
+    """Return the images and recordings of a drag."""
+    paths = dropped_paths(event.mimeData())
+    return [path for path in paths if path.suffix.lower() in (*SUFFIXES, RECORDING)]

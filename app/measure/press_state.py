@@ -19,10 +19,12 @@ from gelpolight_core.lab.measurement_record import verdict_of
 from gelpolight_core.measurement.measured_value import named
 from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.reference_object import ReferenceObject
 
 from .measurement_model import MeasurementModel
-from .reference_comparison import quantities_of
+from .record_table import VERDICTS, verdict_role
+from .reference_comparison import doubts_of, quantities_of
 
 FIGURE_SPACE, POINT_SPACE = "\N{FIGURE SPACE}", "\N{PUNCTUATION SPACE}"
 """As wide as a digit and as the decimal point."""
@@ -63,8 +65,8 @@ class PressState:
         The chosen tool and the name of the image.
     kind, asked, unit : str
         Name of the chosen tool, and the figure that has a reference. Empty if there is none.
-    verdict : str
-        As of a record. Empty without a result.
+    verdict, verdict_role : str
+        Word and role of the verdict. Empty without a result or a true value.
     rows : tuple of ResultRow
         The figures of the chosen tool.
     budget : tuple of tuple of str
@@ -85,15 +87,11 @@ class PressState:
     asked: str = ""
     unit: str = "mm"
     verdict: str = ""
+    verdict_role: str = ""
     rows: tuple[ResultRow, ...] = ()
     budget: tuple[tuple[str, ...], ...] = ()
     reason: str = ""
     role: str = "muted"
-
-    @property
-    def savable(self) -> bool:
-        """Whether there is a result to save."""
-        return bool(self.rows)
 
 
 def resolve_press(
@@ -125,7 +123,7 @@ def resolve_press(
         freezable=freezable,
         reconstructing=work.image is not None and work.heightmap is None and work.busy,
         detecting=work.detecting,
-        image="" if work.image is None else work.image.name,
+        image="" if work.image is None else work.image.name + _zero_of(work.heightmap),
         title="" if tool is None else palette_entry(tool.name).label,
         kind="" if tool is None else tool.name,
     )
@@ -135,9 +133,15 @@ def resolve_press(
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if result.tool == tool:
             return _with_result(state, result, reference, quantities_of(result, reference, limits))
-    if answer.refused:
-        return replace(state, reason=answer.refused, role="fail")
+    if refused := work.refused or answer.refused:
+        return replace(state, reason=refused, role="fail")
     return replace(state, reason="Measuring…" if tool and state.measurable else "")
+
+
+def _zero_of(heightmap: HeightMap | None) -> str:
+    """Return from where a depth counts, if that is not a plane."""
+    is_flat = heightmap is None or heightmap.at_rest.flat
+    return "" if is_flat else "\nThe depth counts from the curved membrane at rest."
 
 
 def _with_result(
@@ -146,13 +150,16 @@ def _with_result(
     reference: ReferenceObject,
     quantities: tuple[Quantity, ...],
 ) -> PressState:
-    doubtful = result.verdict != "ok"
-    reasons = [f"Doubtful: {result.reason}"] if doubtful else []
+    doubtful = bool(doubts_of(result, reference))
+    word, role = VERDICTS.get(verdict_of(quantities, doubtful=doubtful), ("", ""))
+    rows = [_row(*pair, doubtful=doubtful) for pair in named(result.figures, quantities)]
+    reasons = [f"Doubtful: {result.reason}"] if result.findings else []
     reasons += [finding.line for finding in reference.findings()]
     return replace(
         state,
-        verdict=verdict_of(quantities, doubtful=doubtful),
-        rows=tuple(_aligned([_row(*pair) for pair in named(result.figures, quantities)])),
+        verdict=word,
+        verdict_role=verdict_role(role, *quantities),
+        rows=tuple(_aligned(rows)),
         budget=_budget([quantity for quantity in quantities if quantity.parts]),
         reason="\n".join(reasons),
         role="warn" if reasons else "muted",
@@ -175,7 +182,7 @@ def _budget(known: list[Quantity]) -> tuple[tuple[str, ...], ...]:
     return ((unit_behind(unit).strip(), *names), *body)
 
 
-def _row(label: str, quantity: Quantity) -> ResultRow:
+def _row(label: str, quantity: Quantity, *, doubtful: bool) -> ResultRow:
     unit, factor = quantity.unit, 1.0
     if unit == "mm":
         unit, factor = readable_unit(quantity.value, quantity.truth or 0.0)
@@ -192,9 +199,9 @@ def _row(label: str, quantity: Quantity) -> ResultRow:
     return replace(
         row,
         reference=f"{factor * quantity.truth:.{digits}f}",
-        deviation=f"{factor * quantity.error:+.{digits}f}",
-        percent=f"{quantity.error_percent:+.2f} %",
-        role=quantity.verdict or "",
+        deviation=f"{factor * quantity.error:+z.{digits}f}",
+        percent=f"{quantity.error_percent:+z.2f} %",
+        role=verdict_role(quantity.verdict or "", quantity, doubtful=doubtful),
         decision=quantity.judgement,
     )
 

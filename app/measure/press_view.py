@@ -24,6 +24,7 @@ from app.source_ui.bench_panel import BenchArea
 from app.views.map.colour_tables import colour_table
 from app.widgets.actions import Slot, action_button, icon_button, make_action, undo_actions
 from app.widgets.inputs import refusal
+from app.widgets.label import plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, Remedy
@@ -32,7 +33,6 @@ from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.measurement.result import MeasuredPress, Measurement
 from gelpolight_core.output.recording.recording_format import ENDING as RECORDING
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.sensor.sensor_calibration import Calibration
 from gelpolight_core.session.file_hashes import file_hash
 
 from .indenter_mesh import solid_of
@@ -47,6 +47,11 @@ from .tool_map import ToolList, ToolMap, ToolPalette, ToolSection
 TOOLS_WIDTH = 148
 QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}
 """What colours the surface in 3D."""
+CERTIFY_TIPS = (
+    "Measure a ball, cylinder or cuboid first. A record only names its image: double-click it",
+    "Save the sizes with their uncertainty budget and decisions as PDF",
+)
+"""Of the certificate: why there is none, and what it is."""
 
 
 class PressView(QWidget):
@@ -58,6 +63,8 @@ class PressView(QWidget):
         For long work.
     on_save : callable
         Called with a MeasurementRecord to be saved.
+    is_saved : callable
+        Returns whether the records hold the measurement of a MeasurementRecord.
     on_edit, on_records : callable
         Called to edit the known objects, and to show the records.
     context : AppContext
@@ -74,13 +81,16 @@ class PressView(QWidget):
         jobs: JobQueue,
         *,
         on_save: Callable[[MeasurementRecord], object],
+        is_saved: Callable[[MeasurementRecord], bool],
         on_edit: Slot,
         on_records: Slot,
         context: AppContext,
     ) -> None:
         super().__init__()
         set_names(self, "measure.press", "Measure a press")
-        self.context, self._jobs, self._on_save = context, jobs, on_save
+        self.context, self._jobs = context, jobs
+        self._on_save, self._is_saved = on_save, is_saved
+        self._answer = ""
         self.work = MeasurementModel(self)
         self.live = LiveSession(context=context, name="measure live", parent=self)
         self.live_depth = LiveDepth(self.live, jobs, self, context=context)
@@ -133,12 +143,7 @@ class PressView(QWidget):
             "measure.hold", "Freeze", self.toggle_freeze, keys=("Space",), tip=tip
         )
         self.save_action = add("measure.keep", "Save to records", self.keep, keys=("Ctrl+Return",))
-        self.certify_action = add(
-            "measure.certify",
-            "Certificate…",
-            self.choose_certificate,
-            tip="Save the sizes with their uncertainty budget and decisions as PDF",
-        )
+        self.certify_action = add("measure.certify", "Certificate…", self.choose_certificate)
         tip, remove = "Remove the chosen tool (Del)", self.work.remove
         self.remove_action = add("measure.remove", "Remove", remove, icon_name="remove", tip=tip)
         add("measure.fit", "Whole map", self.map.map.fit, keys=("F",))
@@ -174,11 +179,6 @@ class PressView(QWidget):
         self.work.show_as(self.context.display.value)
 
     # Called by the page
-
-    @property
-    def calibration(self) -> Calibration | None:
-        """The calibration used for measuring. None if there is none."""
-        return None if self._best is None else self._best.calibration
 
     def enter(self) -> None:
         """Show the source through the calibration in use."""
@@ -219,13 +219,8 @@ class PressView(QWidget):
     def choose_file(self) -> None:
         """Let the user choose an image or a recording."""
         endings = " ".join(f"*{ending}" for ending in (*SUFFIXES, RECORDING))
-        path = ask_open(
-            self,
-            self.context.settings,
-            "press",
-            "Open an image or a recording",
-            f"Images and recordings ({endings})",
-        )
+        title, patterns = "Open an image or a recording", f"Images and recordings ({endings})"
+        path = ask_open(self, self.context.settings, "press", title, patterns)
         if path is not None:
             self.try_file(path)
 
@@ -336,22 +331,26 @@ class PressView(QWidget):
 
     def keep(self) -> None:
         """Save the result of the chosen tool to the records."""
-        result, heightmap = self.work.result, self.work.heightmap
-        if result is None or heightmap is None or self._best is None:
-            return
         if fault := refusal(self.inspector.reference):
             self.context.toasts.show(fault, "warn")
-            return
-        record = record_of(
+        elif (record := self._record()) is not None:
+            self._on_save(record)
+
+    def _record(self) -> MeasurementRecord | None:
+        """Return the record of the chosen tool's result. None: there is no result."""
+        image, result, heightmap = self.work.image, self.work.result, self.work.heightmap
+        if image is None or result is None or heightmap is None or self._best is None:
+            return None
+        return record_of(
             result,
-            self.inspector.reference.stated,
+            self.inspector.reference.stated_for(result.tool.name),
             heightmap,
             limits=self.context.settings.limits,
             serial=self._best.calibration.serial,
             operator=self.inspector.remarks.value.operator.strip(),
             note=self.inspector.remarks.value.note.strip(),
+            file=image.path,
         )
-        self._on_save(record)
 
     def choose_certificate(self) -> None:
         """Let the user choose the file of the certificate of the measured object."""
@@ -363,9 +362,9 @@ class PressView(QWidget):
     def certify(self, path: Path) -> None:
         """Write the certificate of the measured object. The panel shows how it ended."""
         image, heightmap, fit = self.work.image, self.work.heightmap, self._measurement
-        calibration = self.calibration
-        if image is None or heightmap is None or fit is None or calibration is None:
+        if image is None or heightmap is None or fit is None or self._best is None:
             return
+        calibration = self._best.calibration
         digest = "" if image.path is None else file_hash(image.path)
         truth = self.inspector.reference.stated_for(fit.shape)
         press = MeasuredPress(image.name, digest, heightmap, fit, truth)
@@ -429,17 +428,21 @@ class PressView(QWidget):
         if self.work.refused:
             self.stage.show_message("This image cannot be measured.")
         self.inspector.show_state(state)
-        if self.work.answer:
-            self.inspector.show_message(self.work.answer, "warn")
+        if self.work.answer != self._answer:  # that of the image before is cleared
+            self._answer = self.work.answer
+            self.inspector.show_message(self._answer, "warn")
         self.palette_.setEnabled(state.measurable)
         self.detect_action.setEnabled(state.measurable and not state.detecting)
         self.detect_action.setText("Detecting…" if state.detecting else "Detect")
         self.freeze_action.setEnabled(state.frozen or state.freezable)
         self.freeze_action.setText("Next object" if state.frozen else "Freeze")
-        self.save_action.setEnabled(state.savable)
-        self.certify_action.setEnabled(state.savable and self._measurement is not None)
-        earlier = "Save the earlier press"
-        self.save_action.setText(earlier if state.earlier else "Save to records")
+        record = self._record()
+        saved = record is not None and self._is_saved(record)
+        self.save_action.setEnabled(record is not None and not saved)
+        text = "Save the earlier press" if state.earlier else "Save to records"
+        self.save_action.setText("Saved" if saved else text)
+        self.certify_action.setEnabled(self._measurement is not None)
+        self.certify_action.setToolTip(plain_tip(CERTIFY_TIPS[self._measurement is not None]))
         self.remove_action.setEnabled(bool(state.kind))
         if not state.frozen:
             self.palette_.clear()

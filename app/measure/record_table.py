@@ -7,9 +7,14 @@ from dataclasses import replace
 from app.widgets.cells_table import TableCell
 from app.widgets.icons import tool_icon
 from gelpolight_core.base.compared_quantity import DECISIONS, Quantity, value_text
+from gelpolight_core.base.finding import Verdict
 from gelpolight_core.lab.measurement_record import DOUBTFUL, STORED, MeasurementRecord
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 
+from .reference_comparison import FILE
+
+_FIGURES = "Size or figure", "Error", "Depth", "Error"
+TITLES = ("Date", "Sensor", "Object", *_FIGURES, "Verdict", "Operator", "Note", "Image")
 NOTE, IMAGE = 9, 10
 """Columns."""
 EVALUATION = "evaluation"
@@ -18,6 +23,22 @@ VERDICTS = {stored: (DECISIONS[verdict], verdict.value) for verdict, stored in S
     DOUBTFUL: ("doubtful", "warn")
 }
 """Word and role of each stored verdict."""
+
+
+def verdict_role(role: str, *quantities: Quantity, doubtful: bool = False) -> str:
+    """Return the role of a verdict. What is doubtful or unexplained is no pass.
+
+    Parameters
+    ----------
+    role : str
+        ``pass``, ``warn``, ``fail``, or empty without a verdict.
+    quantities : Quantity
+        What was judged.
+    doubtful : bool, optional
+        Whether the measurement or its reference is.
+    """
+    explained = all(quantity.explained for quantity in quantities)
+    return "warn" if role == Verdict.PASS and (doubtful or not explained) else role
 
 
 def shape_label(shape: str) -> str:
@@ -31,40 +52,25 @@ def _shape_icon(shape: str) -> str:
     return "report" if shape == EVALUATION else tool_icon(shape.replace("_", "-"))
 
 
-def record_titles() -> tuple[str, ...]:
-    """Return the titles of the columns."""
-    return (
-        "Date",
-        "Sensor",
-        "Object",
-        "Size or figure",
-        "Error",
-        "Depth",
-        "Error",
-        "Verdict",
-        "Operator",
-        "Note",
-        "Image",
-    )
-
-
 def record_cells(record: MeasurementRecord) -> tuple[TableCell, ...]:
     """Return the cells of a measurement."""
     word, role = VERDICTS.get(record.verdict, ("no true value", ""))
+    role = verdict_role(role, *record.quantities)
+    doubtful = record.verdict == DOUBTFUL
     time = f"{record.time.astimezone():%Y-%m-%d %H:%M}"
     cells = (
         TableCell(time, key=record.time.timestamp()),
         TableCell(record.serial),
         TableCell(shape_label(record.shape), _shape_icon(record.shape)),
-        *_figure_cells(record.quantities[0]),
-        *_figure_cells(_depth(record)),
+        *_figure_cells(record.quantities[0], doubtful=doubtful),
+        *_figure_cells(_depth(record), doubtful=doubtful),
         TableCell(word, role, role),
         *map(TableCell, (record.operator, record.note, record.picture)),
     )
     return tuple(replace(cell, tip=_tip(record)) for cell in cells)
 
 
-def _figure_cells(quantity: Quantity | None) -> tuple[TableCell, TableCell]:
+def _figure_cells(quantity: Quantity | None, *, doubtful: bool) -> tuple[TableCell, TableCell]:
     """Return the cells of a value with its error."""
     if quantity is None:
         return TableCell("", key=-1e9), TableCell("", key=-1e9)
@@ -73,8 +79,8 @@ def _figure_cells(quantity: Quantity | None) -> tuple[TableCell, TableCell]:
         return value, TableCell("", key=-1e9)
     error = value_text(quantity.error, unit=quantity.unit, sign="+")
     return value, TableCell(
-        f"{error}, {quantity.error_percent:+.2f} %",
-        role=quantity.verdict or "",
+        f"{error}, {quantity.error_percent:+z.2f} %",
+        role=verdict_role(quantity.verdict or "", quantity, doubtful=doubtful),
         key=quantity.error_percent,
         right=True,
     )
@@ -87,6 +93,8 @@ def _depth(record: MeasurementRecord) -> Quantity | None:
 def _tip(record: MeasurementRecord) -> str:
     lines = [f"{quantity.name}: {quantity.text}" for quantity in record.quantities]
     lines.append(f"calibration {record.calibration_id}")
+    file = record.settings.get(FILE)
+    lines.append(f"double-click to open {file}" if file else "its image was not kept as a file")
     if record.reason:
         lines.append(f"doubtful: {record.reason}")
     return "\n".join(lines)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
@@ -16,7 +17,7 @@ from app.widgets.actions import UndoStep
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.store import Store
 from gelpolight_core.lab.measurement_record import MeasurementRecord
-from gelpolight_core.lab.measurement_store import NAME, write_csv
+from gelpolight_core.lab.measurement_store import NAME
 
 RecordEdit = Callable[[Store], object]
 
@@ -74,17 +75,20 @@ class RecordsModel(QObject):
             self.refresh()
 
     def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Save a measurement. `done` is called with its number when it is on disk."""
-        self.change("Saving the measurement", lambda records: records.add(record), done)
+        """Save a measurement once. `done` is called with its number when it is on disk."""
+
+        def save(store: Store) -> int:
+            return number_of(record, store.all(MeasurementRecord)) or store.add(record)
+
+        self.change("Saving the measurement", save, done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
-        if numbers:
-            self._push(
-                f"remove {len(numbers)} measurements",
-                lambda records: records.remove(*numbers),
-                lambda records: records.restore(*numbers),
-            )
+        self._push(
+            f"remove {len(numbers)} measurements",
+            lambda records: records.remove(*numbers),
+            lambda records: records.restore(*numbers),
+        )
 
     def write_note(self, record: MeasurementRecord, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
@@ -98,16 +102,6 @@ class RecordsModel(QObject):
     def _push(self, text: str, redo: RecordEdit, undo: RecordEdit) -> None:
         change = partial(self.change, "Changing the records")
         self.undo.push(UndoStep(text, partial(change, redo), partial(change, undo)))
-
-    def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
-        """Write a table of all measurements, or of one sensor's."""
-
-        def write(store: Store) -> int:
-            records = store.all(MeasurementRecord, serial=serial)
-            write_csv(records, path)
-            return len(records)
-
-        self.change("Writing the table", write, done)
 
     def close(self) -> None:
         """Finish the work in progress."""
@@ -146,6 +140,12 @@ class RecordsModel(QObject):
         if records != self.records:
             self.records = records
             self.changed.emit()
+
+
+def number_of(record: MeasurementRecord, saved: Iterable[MeasurementRecord]) -> int | None:
+    """Return the number under which the same measurement is saved. None: it is not."""
+    measured = attrgetter("picture", "serial", "calibration_id", "shape", "quantities")
+    return next((other.id for other in saved if measured(other) == measured(record)), None)
 
 
 def _nothing(_records: Store) -> None:

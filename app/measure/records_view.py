@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -22,11 +22,13 @@ from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import Quantity, unit_behind
 from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_store import write_csv
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few_repeats
 from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
 
-from .record_table import IMAGE, NOTE, record_cells, record_titles, shape_label
+from .record_table import IMAGE, NOTE, TITLES, record_cells, shape_label
 from .records_model import RecordsModel
+from .reference_comparison import FILE
 
 IMAGE_WIDTH = 130
 
@@ -38,20 +40,25 @@ class RecordsView(QWidget):
     ----------
     book : RecordsModel
         The records.
+    on_open : callable
+        Called with the file of an image to measure on it again.
     context : AppContext
         Shared by all pages.
     """
 
-    def __init__(self, book: RecordsModel, *, context: AppContext) -> None:
+    def __init__(
+        self, book: RecordsModel, *, on_open: Callable[[Path], object], context: AppContext
+    ) -> None:
         super().__init__()
         set_names(self, "measure.results", "Records")
-        self._book, self._context = book, context
+        self._book, self._on_open, self._context = book, on_open, context
         self.sensor = set_names(ComboBox(), "measure.results.sensor", "Sensor")
         self.shape = set_names(ComboBox(), "measure.results.shape", "Object")
         for box in (self.sensor, self.shape):
             box.activated.connect(self._on_filter)
+        export, tip = self.choose_export, "Save the selected records, or all that are shown"
         self.export_action = make_action(
-            self, "records.export", "Records as CSV…", self.choose_export, icon_name="copy"
+            self, "records.export", "Records as CSV…", export, icon_name="copy", tip=tip
         )
         self.remove = make_action(
             self,
@@ -62,8 +69,8 @@ class RecordsView(QWidget):
             icon_name="remove",
             tip="Delete measurements",
         )
-        titles = "Undo in the records", "Redo in the records"
-        undo_actions(self, "records", book.undo, titles)
+        self._offer = ""
+        undo_actions(self, "records", book.undo, ("Undo in the records", "Redo in the records"))
         self.count = named_label("measure.results.count", "Number of records shown", wrap=False)
         self.message = named_label("measure.results.message", "Last answer", role="muted")
         self.table = self._make_table()
@@ -77,18 +84,20 @@ class RecordsView(QWidget):
         self.drift_title = named_label("measure.results.drift_title", title, wrap=False)
         self._lay_out()
         book.changed.connect(self.refresh)
+        book.undo.indexChanged.connect(self._close_offer)
         self.refresh()
 
     def _make_table(self) -> CellsTable[MeasurementRecord]:
         table = CellsTable[MeasurementRecord](
             "measure.results.table",
             "Measurements",
-            record_titles(),
+            TITLES,
             record_cells,
             lambda record: record.id,
             editable=NOTE,
         )
         table.edited.connect(self._book.write_note)
+        table.doubleClicked.connect(lambda index: self._open(index.column()))
         table.sortByColumn(0, Qt.SortOrder.DescendingOrder)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.verticalHeader().setDefaultSectionSize(26)
@@ -166,13 +175,26 @@ class RecordsView(QWidget):
     def remove_selected(self) -> None:
         """Remove the selected measurements. Ctrl+Z restores them."""
         numbers = tuple(r.id for r in self.table.selected if r.id is not None)
-        if not numbers:
-            return
         self._book.remove(numbers)
-        text = f"{len(numbers)} measurements removed."
-        if len(numbers) == 1:
-            text = "1 measurement removed."
-        self._context.toasts.show(text, actions=(("Undo", self._book.undo.undo),))
+        self._offer = f"Measurements removed: {len(numbers)}"
+        self._context.toasts.show(self._offer, actions=(("Undo", self._book.undo.undo),))
+
+    def _close_offer(self) -> None:
+        """Close the message that offers to undo a removal: another step is the last one now."""
+        for toast in self._context.toasts.shown():
+            if toast.text == self._offer:
+                toast.dismiss()
+
+    def _open(self, column: int) -> None:
+        """Measure again on the image of the selected record. A note is edited instead."""
+        record = self.table.chosen()
+        if record is None or column == NOTE:
+            return
+        file = record.settings.get(FILE, "")
+        if Path(file).is_file():
+            self._on_open(Path(file))
+        else:
+            self.message.setText(f"There is no image file {file or record.picture} to open.")
 
     def choose_export(self) -> None:
         """Let the user choose the file of the table."""
@@ -182,12 +204,14 @@ class RecordsView(QWidget):
             self.export_to(path)
 
     def export_to(self, path: Path) -> None:
-        """Write the table of all measurements, or of the selected sensor's."""
+        """Write the table of the selected measurements or, if none is selected, of all shown."""
+        records = self.table.selected or self.table.shown
+        saved = f"{len(records)} measurements saved to {path}"
         self.message.setText("Writing the table")
-        self._book.export(
-            path,
-            self.sensor.currentData() or None,
-            lambda count: self.message.setText(f"{count} measurements saved to {path}"),
+        self._book.change(
+            "Writing the table",
+            lambda _store: write_csv(records, path),
+            lambda _: self.message.setText(saved),
         )
 
 
@@ -208,9 +232,8 @@ def errors_over_time(
         for quantity in record.quantities:
             if quantity.error_percent is not None:
                 in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
-                points_by_direction[in_depth].append(
-                    (record.time.timestamp(), quantity.error_percent)
-                )
+                point = record.time.timestamp(), quantity.error_percent
+                points_by_direction[in_depth].append(point)
     plane, depth = (
         tuple(zip(*points, strict=True)) or ((), ()) for points in points_by_direction.values()
     )
@@ -237,28 +260,22 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
         title += f", true {sizes}"
     rows = []
     for quantity in first.quantities[:2]:
-        quantities = [record.quantity(quantity.name) for record in group]
-        values = [q.value for q in quantities if q is not None]
-        errors = [
-            q.error_percent for q in quantities if q is not None and q.error_percent is not None
-        ]
+        found = [q for record in group if (q := record.quantity(quantity.name)) is not None]
+        values = [q.value for q in found]
+        errors = [q.error_percent for q in found if q.error_percent is not None]
         rows.append(_row("td", *_cells(quantity, statistics_of(values), errors)))
     heads = "mean", "sd", "spread", "repeatability", "mean error"
-    note = (
-        "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
-    )
+    note = "Repeatability: two measurements differ by less than this value in 95 of 100 cases."
     table = f"<table>{_row('th', '', heads)}{''.join(rows)}</table>"
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
 
 def _cells(quantity: Quantity, found: Statistics, errors: list[float]) -> tuple[str, list[str]]:
     """Return label and figures of a quantity."""
-    cells = [
-        f"{value:.4f}" if math.isfinite(value) else "-"
-        for value in (found.mean, found.sd, found.spread)
-    ]
+    values = found.mean, found.sd, found.spread
+    cells = [f"{value:.4f}" if math.isfinite(value) else "-" for value in values]
     limit = too_few_repeats(found.missing) or f"{found.repeatability:.4f}"
-    error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
+    error = f"{sum(errors) / len(errors):+z.2f} %" if errors else "-"
     return f"{quantity.label} ({quantity.unit})", [*cells, limit, error]
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from app.program.preferences import WarningLimits
 from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.finding import Finding, join_reasons
 from gelpolight_core.lab.measurement_record import MeasurementRecord, verdict_of
 from gelpolight_core.measurement.result import compare_with_truth
 from gelpolight_core.measurement.tools.tool_base import ToolResult
@@ -16,6 +18,14 @@ from gelpolight_core.measurement.tools.tool_registry import (
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.reference_object import ReferenceObject
+
+FILE = "file"
+"""Setting of a record: the path of its image, empty if it was not a file."""
+
+
+def doubts_of(result: ToolResult, reference: ReferenceObject) -> tuple[Finding, ...]:
+    """Return why a comparison is doubtful: the result, or a reference whose calibration ended."""
+    return (*result.findings, *reference.findings())
 
 
 def quantities_of(
@@ -51,6 +61,7 @@ def record_of(
     serial: str,
     operator: str,
     note: str,
+    file: Path | None = None,
 ) -> MeasurementRecord:
     """Return the record to be saved.
 
@@ -68,22 +79,26 @@ def record_of(
         The sensor.
     operator, note : str
         Operator, and their note.
+    file : Path, optional
+        The image, if it is a file.
     """
     fit, quantities = result.measurement, quantities_of(result, reference, limits)
     if fit is None:
         shape, details = result.tool.name.replace("-", "_"), result_as_dict(result)
     else:
         shape, details = fit.shape, fit.as_json(reference, limits.percent)
-    settings = {"model": heightmap.model, "tool": tool_as_dict(result.tool)}
+    tool, path = tool_as_dict(result.tool), str(file or "")
+    settings = {"model": heightmap.model, "tool": tool, FILE: path}
     if reference.name:
         settings["indenter"] = reference.name
+    doubts = doubts_of(result, reference)
     return MeasurementRecord(
         serial=serial,
         calibration_id=heightmap.calibration_id,
         shape=shape,
         quantities=quantities,
-        verdict=verdict_of(quantities, doubtful=result.verdict != "ok"),
-        reason=result.reason,
+        verdict=verdict_of(quantities, doubtful=bool(doubts)),
+        reason=join_reasons(doubts),
         settings=settings,
         details=details,
         operator=operator,

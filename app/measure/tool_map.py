@@ -30,6 +30,7 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import finding_from_error
 from gelpolight_core.measurement.tools.tool_base import PaletteEntry, Tool
 from gelpolight_core.measurement.tools.tool_placing import first_points, make_tool
 from gelpolight_core.measurement.tools.tool_registry import PALETTE, TOOLS, palette_entry
@@ -168,7 +169,7 @@ class ToolMap(HeightPanel):
         try:
             self._work.add(make_tool(TOOLS[self._kind], points))
         except InputError as error:
-            self._on_placed(str(error))
+            self._on_placed(finding_from_error(error).line)
         else:
             self._on_placed("")
 
@@ -184,7 +185,7 @@ class ToolMap(HeightPanel):
             )
         elif self._work.chosen:
             text = "Drag the squares, or move them with the arrow keys."
-        elif self._work.image is not None:
+        elif self._work.heightmap is not None:
             text = "Choose a tool on the left, or detect the object (Q)."
         self.hint.setText(text)
 

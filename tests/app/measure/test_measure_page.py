@@ -109,6 +109,7 @@ def test_damaged_records_are_reported(context, qtbot):
     assert "calibration" in page.press_view.banner.findChild(object, "inspect.advice").text()
     assert not page.press_view.palette_.buttons["distance"].isEnabled()
     assert not page.press_view.save_action.isEnabled()
+    assert page.press_view.inspector.image.text() == "", "there is nothing to freeze"
     assert page.results.stack.currentIndex() == 0
     _close(page)
     context.toasts.clear()
@@ -155,10 +156,11 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
         assert float(text) == pytest.approx(row["deviation_expanded"], abs=0.001)
 
     # Other limits of the user apply at once.
-    assert press_view.state.rows[0].role == "warn"  # this sensor is known to 7 %
+    assert press_view.state.rows[0].decision.startswith("not decidable")  # known to 7 %
     context.settings.limits = WarningLimits(size_percent=20.0)
     context.requests.preferences_changed.emit()
-    assert press_view.state.rows[0].role == "pass"
+    assert press_view.state.rows[0].decision.startswith("conforms")
+    assert press_view.state.rows[0].role == press_view.state.verdict_role == "warn"  # doubtful
     # The command judges by the same tolerances.
     assert reported["comparisons"][0]["decision"] == "not decidable"
     context.settings.save()
@@ -204,31 +206,56 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     _measured(page, qtbot)
     assert work.result.measurement.diameter_mm == pytest.approx(fitted.diameter_mm)
 
-    for count in (1, 2):
+    for count, expanded_mm in enumerate((0.0, 0.01), 1):
+        reference.state(ReferenceObject(size_mm=4.0, size_expanded_mm=expanded_mm))
+        assert page.press_view.save_action.isEnabled()
         page.press_view.keep()
+        page.press_view.keep()  # a second time changes nothing
         _kept(page, qtbot, count)
+        assert not page.press_view.save_action.isEnabled()
     results = page.results
     assert page.history is page.press_view.work.undo
     page.tabs.setCurrentWidget(results)
     assert page.history is page.book.undo
     assert "2 x" in results.statistics.text()
+    toasts = page.context.toasts
+    toasts.attach(page, lambda: None)
     results.table.selectRow(0)
     results.remove_selected()
     _kept(page, qtbot, 1)
+    assert [toast.text for toast in toasts.shown()] == ["Measurements removed: 1"]
     page.book.undo.undo()
+    assert toasts.shown() == []
     _kept(page, qtbot, 2)
     page.book.write_note(page.book.records[0], "worn tip")
     qtbot.waitUntil(lambda: page.book.records[0].note == "worn tip")
     page.book.undo.undo()
     qtbot.waitUntil(lambda: page.book.records[0].note == "")
-    table = tmp_path / "out.csv"
-    results.export_to(table)
-    qtbot.waitUntil(lambda: table.exists() and not page.book.busy)
-    with table.open(newline="", encoding="utf-8-sig") as stream:
-        rows = list(csv.DictReader(stream))
-    assert {row["quantity"] for row in rows} == {"diameter_mm", "height_mm"}
-    assert len(rows) == 4
-    page.context.toasts.clear()
+    for chosen in ({1, 2}, {2}):
+        table = tmp_path / f"{len(chosen)}.csv"
+        results.table.clearSelection()
+        if len(chosen) == 1:
+            results.table.choose(*chosen)
+        results.export_to(table)
+        qtbot.waitUntil(lambda path=table: path.exists() and not page.book.busy)
+        with table.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.DictReader(stream))
+        assert {row["quantity"] for row in rows} == {"diameter_mm", "height_mm"}
+        assert {int(row["id"]) for row in rows} == chosen
+
+    # A double click measures on the image again, as long as it is there.
+    page.press_view.release()
+    assert not page.press_view.certify_action.isEnabled()
+    results.table.doubleClicked.emit(results.table.model().index(0, 0))
+    assert page.tabs.currentWidget() is page.press_view
+    assert page.press_view.work.image.path == press
+    page.book.add(replace(page.book.records[0], settings={"file": "gone.png"}, picture="gone"), int)
+    _kept(page, qtbot, 3)
+    page.press_view.release()
+    results.table.choose(3)
+    results.table.doubleClicked.emit(results.table.model().index(0, 0))
+    assert "gone.png" in results.message.text() and page.press_view.work.image is None
+    toasts.clear()
 
 
 def _true(press: Path) -> dict[str, str]:
@@ -342,6 +369,13 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     page.open_path(wrong)
     advice = page.press_view.banner.findChild(object, "inspect.advice")
     qtbot.waitUntil(lambda: "64x48" in advice.text(), timeout=PATIENCE_MS)
+    assert advice.text().startswith(wrong.name)
+    assert "64x48" in page.press_view.inspector.reason.text()
+    assert page.press_view.map.hint.text() == ""
+    work, message = page.press_view.work, page.press_view.inspector.message
+    work.answer = "Nothing was found"
+    work.changed.emit()
+    assert work.answer in message.text()
     assert not page.press_view.save_action.isEnabled()
 
     dropped = QMimeData()
@@ -350,6 +384,7 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     page.dropEvent(QDropEvent(QPointF(5, 5), Qt.DropAction.CopyAction, dropped, left, none))
     qtbot.waitUntil(lambda: page.press_view.work.heightmap is not None, timeout=PATIENCE_MS)
     assert "64x48" not in advice.text()
+    assert message.isHidden()
 
 
 @pytest.mark.function(

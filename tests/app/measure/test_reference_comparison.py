@@ -1,10 +1,13 @@
 """Errors and verdicts: equal to the core's comparison, and none without a true value."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from app.measure.measurement_engine import MeasuredImage, ToolOutcome
+from app.measure.press_state import PressState, resolve_press
 from app.measure.record_table import record_cells
 from app.measure.records_view import errors_over_time
 from app.measure.reference_comparison import quantities_of, record_of
@@ -12,6 +15,7 @@ from app.program.preferences import WarningLimits
 from app.widgets.icons import icon
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.finding import Verdict, doubtful_finding
+from gelpolight_core.geometry.membrane_shape import MembraneShape
 from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.measurement.measured_value import MeasuredValue
 from gelpolight_core.measurement.result import Measurement
@@ -56,6 +60,16 @@ def _record(
     )
 
 
+def _state(
+    result: ToolResult, reference: ReferenceObject, heightmap: HeightMap | None = None
+) -> PressState:
+    work = SimpleNamespace(
+        tool=result.tool, chosen=1, answer_of=lambda _key: ToolOutcome(result),
+        image=MeasuredImage("p.png"), heightmap=heightmap, busy=False, detecting=False, refused="",
+    )  # fmt: skip
+    return resolve_press(work, reference, WarningLimits(), freezable=False, earlier=False)
+
+
 def test_only_what_is_known_is_judged():
     def limits(result: ToolResult, reference: ReferenceObject) -> dict[str, float | None]:
         found = quantities_of(result, reference, WarningLimits())
@@ -73,11 +87,40 @@ def test_only_what_is_known_is_judged():
 def test_the_verdict_follows_the_limits():
     reference = ReferenceObject(size_mm=5.0, height_mm=1.0)
     assert _record(PRESSED, reference).verdict == "pass"
+    ended = replace(reference, due="2020-01-31", serial="7")
+    assert _record(PRESSED, ended).verdict == "doubtful" and "7" in _record(PRESSED, ended).reason
     strict = WarningLimits(size_percent=1.0)
     assert _record(PRESSED, reference, strict).verdict == "fail"
     doubtful = replace(PRESSED, findings=(doubtful_finding("cut", "cut"),))
     assert _record(doubtful, reference).verdict == "doubtful"
     assert _record(PRESSED, ReferenceObject()).verdict == ""
+
+
+@pytest.mark.parametrize(
+    ("sd", "due", "role"), [(0.06, "", "pass"), (0.02, "", "warn"), (0.06, "2020-01-31", "warn")]
+)
+def test_what_the_uncertainties_do_not_explain_is_not_green(qapp, sd, due, role):
+    reference = ReferenceObject(size_mm=5.0, due=due)
+    fit = replace(FIT, sd={**FIT.sd, "diameter_mm": sd})
+    result = replace(PRESSED, measurement=fit)
+    state = _state(result, reference)
+    assert (state.rows[0].role, state.verdict_role) == (role, role)
+    cells = record_cells(_record(result, reference))
+    assert (cells[4].role, cells[7].role) == (role, role)
+
+
+def test_a_curved_membrane_is_named_as_the_zero_of_the_depth():
+    axis, flat = np.arange(2.0), np.zeros((2, 2), np.float32)
+    plane = HeightMap(flat, axis, axis, 1.0, None, flat.astype(np.uint8), "A-1", "full", "p.png")
+    curved = replace(plane, at_rest=MembraneShape(rise_mm=0.2))
+    texts = [_state(APART, ReferenceObject(), zero).image for zero in (None, plane, curved)]
+    assert texts[:2] == ["p.png", "p.png"] and "curved" in texts[2]
+
+
+def test_a_deviation_of_zero_has_no_minus_sign():
+    result = replace(PRESSED, measurement=replace(FIT, diameter_mm=4.99999))
+    state = _state(result, ReferenceObject(size_mm=5.0))
+    assert (state.rows[0].deviation.strip(), state.rows[0].percent) == ("+0.000", "+0.00 %")
 
 
 def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights():

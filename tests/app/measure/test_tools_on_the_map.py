@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.live.tool_layer import move_handle, tool_handles
+from app.measure.measurement_engine import apply_tool
 from app.measure.steady_press import SteadyPressDetector
 from app.sources.source import SourceFrame
 from gelpolight_core.base.compared_quantity import value_text
@@ -42,6 +43,14 @@ def test_every_tool_has_its_own_key_and_asks_for_all_its_points():
     assert all(keys) and len(set(keys)) == len(keys)
     for name, entry in PALETTE.items():
         assert len(first_points(TOOLS[name], (0.0, 0.0))) == len(entry.prompts)
+
+
+@pytest.mark.parametrize("kind", TOOLS.values())
+def test_a_tool_that_finds_nothing_answers_with_a_sentence(kind):
+    axis, flat = np.linspace(-5.0, 5.0, 41), np.zeros((41, 41), np.float32)
+    plane = HeightMap(flat, axis, axis, 0.25, None, flat.astype(np.uint8), "A-1", "full", "p.png")
+    outcome = apply_tool(make_tool(kind, first_points(kind, (0.0, 0.0))), plane)
+    assert outcome.result is not None or outcome.refused[0].isupper()
 
 
 @pytest.mark.parametrize(
