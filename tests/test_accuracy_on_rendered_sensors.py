@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.joint_stage import JOINT
 from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.calibration.project import CalibrationRun, assemble, run_stage
 from gelpolight_core.calibration.recipe import StageResults
@@ -118,3 +119,14 @@ def mean_errors(sensor: Sensor, model: str, presses: slice) -> Array:
 def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor):
     """Of one press; all of them, and the paper's model, are in tests/long."""
     assert (mean_errors(sensor, "full", slice(1)) < BARS[sensor.folder.name, "full"]).all()
+
+
+@pytest.mark.function("A healthy press is not corrected for a fault that it does not have")
+def test_the_edge_of_a_shadow_is_no_blended_light(shared_data, rendered_optics):
+    """The height of one ball of ten was corrected by 3 %, and called ok."""
+    sensor = calibrated(shared_data / "sensor-A", rendered_optics("sensor-A"), slice(None))
+    errors = sensor.run.results[JOINT].checked.height_errors
+    assert np.abs(errors).max() < 0.01
+    reconstruct = Reconstructor(sensor.run.calibration)
+    for path in sorted((sensor.folder / "balls").glob("*.png")):
+        assert not reconstruct.depth(read_linear_image(path).rgb).findings, path.name

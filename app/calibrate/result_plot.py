@@ -26,7 +26,7 @@ from gelpolight_core.output.report.result_pictures import (
     Role,
 )
 
-HEIGHTS = {True: 300, False: 200}
+HEIGHTS = {True: 260, False: 156}
 """Of pictures from above, and of charts."""
 
 
@@ -87,13 +87,14 @@ class ResultPlot(QFrame):
     def _draw(self) -> None:
         self.plot.clear()
         apply_theme(self.plot)
+        self.plot.setBackground(theme.colour("alternate"))
         if any(isinstance(mark, Line) and mark.name for mark in self.picture.marks):
             self.plot.addLegend(offset=(-8, 8), labelTextColor=theme.colour("text"))
         for mark in self.picture.marks:
             self._add(mark)
         self.plot.autoRange(padding=0.08)
         if any(self.picture.labels):
-            self.plot.setYRange(0.0, 1.15 * self._highest(), padding=0.0)
+            self.plot.setYRange(0.0, 1.3 * self._highest(), padding=0.0)
 
     def _highest(self) -> float:
         """Return the largest value that a chart shows."""

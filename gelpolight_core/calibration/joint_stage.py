@@ -57,7 +57,8 @@ def term_facts(full: FullModel) -> tuple[tuple[str, str, bool], ...]:
         if term.key not in full.evidence or not term.parameters:
             continue
         gain, scatter = full.evidence[term.key]
-        worth = f"the misfit of held-out presses falls by {gain:.3g} (sd {scatter:.2g})"
+        change = "falls" if gain > 0.0 else "rises"
+        worth = f"the misfit of held-out presses {change} by {abs(gain):.3g} (sd {scatter:.2g})"
         fitted = [
             f"{p.name} {values[p.full_key]:.3g} (sd {full.membrane_sd[p.full_key]:.2g})"
             for p in term.parameters

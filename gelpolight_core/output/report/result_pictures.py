@@ -38,6 +38,8 @@ DEPTHS_MM = np.geomspace(0.1, 1.5, 40)
 """Depths for which the uncertainty is predicted."""
 BALL_MM = 10.0
 """Diameter of the ball for which that of a closed sensor is predicted: it hardly matters."""
+INWARDS = 0.78
+"""Place of an LED's text between the middle and the LED."""
 MOST_NAMES = 20
 """Contacts that are named in the plan. Chosen: names of more would overlap."""
 BOARDS = "Grey: corners of the board on the top surface."
@@ -237,7 +239,7 @@ def _leds(data: OpenSensor) -> tuple[tuple[Mark, ...], float]:
     ):
         marks.append(_ring(x, y, np.diag(factor * sd), role))
         text = f"\N{PLUS-MINUS SIGN}{1e3 * sd.max():.0f} \N{MICRO SIGN}m"
-        marks.append(Label(x, y + 2.0 * ELLIPSE_MM, text, role))
+        marks.append(Label(INWARDS * x, INWARDS * y, text, role))
     return tuple(marks), factor
 
 
@@ -261,11 +263,19 @@ def _left(data: OpenSensor, left: Float32Array, step: int) -> ResultPicture:
     grid, percent = data.table.grid, 100.0 * left
     seen = percent[np.isfinite(percent)]
     reach = max(float(np.percentile(np.abs(seen), 99.0)), 0.1) if seen.size else 1.0
-    half = 0.5 * grid.pitch_mm
-    rows, columns = (step * n for n in percent.shape)
+    rows, columns = (np.flatnonzero(np.isfinite(percent).any(axis=k)) for k in (1, 0))
+    if not seen.size:
+        rows, columns = np.arange(len(percent)), np.arange(percent.shape[1])
+    part = percent[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    node_mm, half = step * grid.pitch_mm, 0.5 * grid.pitch_mm
     x, y = float(grid.x_mm[0]) - half, float(grid.y_mm[0]) - half
-    edges = x, x + columns * grid.pitch_mm, y, y + rows * grid.pitch_mm
+    edges = (
+        x + node_mm * columns[0],
+        x + node_mm * (columns[-1] + 1),
+        y + node_mm * rows[0],
+        y + node_mm * (rows[-1] + 1),
+    )
     rms = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
     caption = f"Of the untouched membrane's light, where balls were pressed; {rms:.2g} % (rms)."
     title = "Light that the model does not explain (%)"
-    return ResultPicture("left", title, caption, ("", ""), (Field(percent, edges, reach),))
+    return ResultPicture("left", title, caption, ("", ""), (Field(part, edges, reach),))

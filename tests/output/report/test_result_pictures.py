@@ -1,0 +1,84 @@
+"""The pictures of a calibration's result."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.measurement.measurable_depth import measurable_depth
+from gelpolight_core.measurement.object_measurement import measure_heightmap
+from gelpolight_core.measurement.size_uncertainty import expected_sd
+from gelpolight_core.output.report.result_pictures import (
+    Bars,
+    Field,
+    Label,
+    Level,
+    Line,
+    result_pictures,
+)
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session_images import read_linear_image
+
+
+def pictures_of(run):
+    return {picture.key: picture for picture in result_pictures(run.calibration, run)}
+
+
+def marks_of(picture, kind):
+    return [mark for mark in picture.marks if isinstance(mark, kind)]
+
+
+@pytest.mark.function("See the height error of each ball, the worst first")
+def test_the_worst_ball_comes_first_and_is_marked_beyond_the_limit(small_run):
+    joint = small_run.results[JOINT]
+    errors = np.linspace(0.001, 0.008, len(joint.checked.height_errors))
+    errors[1], errors[2] = -0.3, math.nan
+    joint = replace(joint, checked=replace(joint.checked, height_errors=errors))
+    picture = pictures_of(replace(small_run, results=small_run.results.having(JOINT, joint)))
+    (bars,), (limit,) = (marks_of(picture["balls"], kind) for kind in (Bars, Level))
+    assert bars.values[0] == pytest.approx(30.0)
+    assert list(bars.values) == sorted(bars.values, reverse=True)
+    assert len(bars.values) == len(errors) - 1
+    assert [role for role, e in zip(bars.roles, bars.values, strict=True) if e > limit.value] == [
+        "warn"
+    ]
+    assert bars.names[0] in picture["balls"].caption
+
+
+def test_the_plan_shows_leds_and_contacts_where_they_are(small_run):
+    balls, full = small_run.results[JOINT].refined.balls, small_run.calibration.data.full
+    picture = pictures_of(small_run)["plan"]
+    rings = {tuple(np.round([line.x.mean(), line.y.mean()], 1)) for line in marks_of(picture, Line)}
+    for x, y in (*(ball.centre_mm for ball in balls), *full.led_positions_mm[:, :2]):
+        assert any(math.hypot(x - at[0], y - at[1]) < 0.2 for at in rings)
+    named = [label for label in marks_of(picture, Label) if label.role == "accent"]
+    assert len(named) == len(balls)
+
+
+def test_the_map_of_what_is_left_lies_where_balls_were_pressed(small_run):
+    (field,) = marks_of(pictures_of(small_run)["left"], Field)
+    left, right, top, bottom = field.edges
+    rows, columns = field.values.shape
+    for ball in small_run.results[JOINT].refined.balls:
+        x, y = ball.centre_mm
+        column = int((x - left) / (right - left) * columns)
+        row = int((y - top) / (bottom - top) * rows)
+        assert np.isfinite(field.values[row, column])
+    assert np.nanpercentile(np.abs(field.values), 90) <= field.reach
+
+
+def test_the_expected_uncertainty_is_the_one_that_a_measurement_states(small_run):
+    """On a clean press, where the fit adds little."""
+    (path,) = small_run.session.folder.glob("presses/cylinder_s5_d100.png")
+    height_map = measurable_depth(Reconstructor(small_run.calibration), read_linear_image(path))
+    found = measure_heightmap(height_map, shape="cylinder")
+    expected = expected_sd(small_run.calibration, "cylinder", found.diameter_mm, found.height_mm)
+    assert 0.5 < expected["height_mm"] / found.sd["height_mm"] < 1.1
+    assert expected["diameter_mm"] < 1.1 * found.sd["diameter_mm"]
+
+
+def test_a_calibration_alone_shows_what_its_file_holds(small_run):
+    pictures = result_pictures(small_run.calibration, None)
+    assert [picture.key for picture in pictures] == ["uncertainty", "plan"]
