@@ -35,6 +35,16 @@ from .mode_choice import ModeChoice
 from .processing_panel import ProcessingSummary
 from .record_control import RecordControl
 
+LIVE = "Press an object into the membrane. Press Space to freeze it at full detail."
+IDLE = {
+    "folder": "Comma and full stop show the previous and the next image. "
+    "Press Space to see this one at full detail.",
+    "recording": "Comma and full stop step through the recording. "
+    "Press Space to freeze an image at full detail.",
+}
+"""What the banner says without advice, by the kind of the source if it is not live."""
+FROZEN = "The image is frozen. Press Space to continue."
+
 
 class InspectPage(QWidget):
     """Shows the depth of the pressed membrane.
@@ -103,9 +113,8 @@ class InspectPage(QWidget):
         )
         self.file_actions = FileActions(self.live_depth, self.views, self, context=self.context)
         self.views.surface.menu.add("mesh", "Export mesh…", self.export.ask)
-        idle = "Press an object into the membrane. Press Space to freeze it at full detail."
         act, over = self.live_depth.act, self.views.stage.parts
-        self.banner = AdviceBanner(self.jobs, idle=idle, on_act=act, over=over)
+        self.banner = AdviceBanner(self.jobs, idle=LIVE, on_act=act, over=over)
         self.replay = ReplayBar("inspect", lambda: self.pause(False))
         self.processed = ProcessingSummary(self.views.processing.reset)
         parts = self.banner, self.processed, (self.views, 1), self.replay
@@ -136,6 +145,11 @@ class InspectPage(QWidget):
         self.recorder.stop()
         self.live.enter(False)
         self.views.keep()
+
+    def unfinished(self) -> str:
+        """Return what would end if the window was closed. Empty: nothing."""
+        running = self.recorder.action.isChecked()
+        return "A recording is running. Closing ends it and keeps its file." if running else ""
 
     def can_close(self) -> bool:
         """Return True: closing loses nothing."""
@@ -191,6 +205,7 @@ class InspectPage(QWidget):
         self.replay.hold(self._shown.frame if on and self._shown is not None else None)
         self.live.pause(on)
         self._want()
+        self._advise()
 
     def _want(self) -> None:
         self.live_depth.request_results(
@@ -247,7 +262,10 @@ class InspectPage(QWidget):
 
     def _advise(self) -> None:
         """Show what to do next."""
-        self.banner.advise(advise(self.live_depth.state))
+        state = self.live_depth.state
+        self.banner.advise(
+            advise(state), idle=FROZEN if self.live.paused else IDLE.get(state.kind, LIVE)
+        )
 
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""

@@ -127,7 +127,9 @@ class RecordControl(QObject):
             limit_bytes=1e9 * self._context.settings.preferences.recording_limit_gb,
         )
         self.action.setText(f"{time_text(figures.seconds)}, {left_text(room)}")
-        text = f"Recording: {recorder_text(figures)}, {left_text(room)}"
+        # A frozen image is not what is recorded.
+        what = "Recording the live image" if self._depth.live.paused else "Recording"
+        text = f"{what}: {recorder_text(figures)}, {left_text(room)}"
         self._report(text, figures.lost > 0)
         self._heed(room)
         if figures.lost and not self._offered:

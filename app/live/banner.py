@@ -63,9 +63,9 @@ class AdviceBanner(QWidget):
         self._working = False
         self._show()
 
-    def advise(self, advice: Finding | None) -> None:
-        """Show an advice, with a button for its action."""
-        self._advice = advice
+    def advise(self, advice: Finding | None, *, idle: str = "") -> None:
+        """Show an advice, with a button for its action. `idle` replaces the earlier text."""
+        self._advice, self._idle = advice, idle or self._idle
         self._button.setText(BUTTONS.get(action_of(advice), ""))
         self._show()
 

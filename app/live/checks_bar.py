@@ -53,18 +53,19 @@ class ChecksBar(QWidget):
         self.focus = FocusBar()
         self._exposure = set_names(CutLabel(), "live.exposure", "Exposure")
         self._pixel = set_names(CutLabel(), "live.pixel", "Pixel under the pointer")
-        self._pixel.hide()
+        self.show_pixel("")
         hbox((self._exposure, 1), (self._pixel, 1), self.focus, of=self, margins=(8, 4, 8, 4))
 
     def show_line(self, text: str) -> None:
         """Show the advice about the exposure, or why no images arrive."""
         self._exposure.setText(text)
+        self._exposure.setVisible(bool(text) and self._pixel.isHidden())
 
     def show_pixel(self, text: str) -> None:
         """Show the value under the pointer instead of the exposure."""
         self._pixel.setText(text)
         self._pixel.setVisible(bool(text))
-        self._exposure.setVisible(not text)
+        self._exposure.setVisible(not text and bool(self._exposure.text()))
 
 
 HISTOGRAM_PX = 232, 104

@@ -131,6 +131,7 @@ class LiveView(QWidget):
         self._zoom = named_label("live.zoom", "Magnification", wrap=False)
         self._zoom.setFixedWidth(self._zoom.fontMetrics().horizontalAdvance("0000 %"))
         row.addWidget(self._zoom)
+        self._show_zoom(math.nan)
         self.tools["overlay"].setChecked(True)
 
     # Called by the pages
@@ -243,6 +244,8 @@ class LiveView(QWidget):
     def _show_zoom(self, scale: float) -> None:
         """Show the magnification. 1: full size, NaN: no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
+        self._zoom.setHidden(math.isnan(scale))
+        self._bar.adjustSize()
 
     def _on_pointed(self, u: float, v: float) -> None:
         self._pointer = (u, v)

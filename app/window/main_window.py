@@ -35,6 +35,7 @@ from app.program.preferences import THEMES
 from app.program.session_entries import DESCRIPTION, is_session
 from app.widgets import theme
 from app.widgets.actions import Slot, make_action
+from app.widgets.dialog import ask
 from app.widgets.layout import vbox
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
@@ -93,7 +94,7 @@ class MainWindow(QMainWindow):
         self.entries = {entry.name: entry for entry in pages or PAGES}
         self.loader = ModuleLoader(self)
         self._made: dict[str, QWidget] = {}
-        self._asked_for = ""
+        self._asked_for, self._ends_work = "", False
         self._stack = set_names(QStackedWidget(self), "main.pages", "Page")
         centre = QWidget()
         vbox(
@@ -416,8 +417,19 @@ class MainWindow(QMainWindow):
         """Switch full screen on or off."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
+    def _close_anyway(self) -> None:
+        self._ends_work = True
+        self.close()
+
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask all pages, then leave the visible one and save the window layout."""
+        # All are asked before the first one ends its work.
+        texts = [_call(page, "unfinished", default="") for page in self._made.values()]
+        if any(texts) and not self._ends_work:
+            event.ignore()
+            text, close = " ".join(filter(None, texts)), ("Close", self._close_anyway)
+            ask(self, "Close the program?", text, close)
+            return
         if not all(_call(page, "can_close", default=True) for page in self._made.values()):
             event.ignore()
             return

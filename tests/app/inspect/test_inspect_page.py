@@ -193,6 +193,13 @@ def test_a_recording_is_made_and_replayed(
     state = pressed.findChild(QLabel, "inspect.recorded")
     qtbot.waitUntil(state.isVisible, timeout=WAIT_MS)
     assert state.property("meaning") == "muted"
+    banner, live = _advice(pressed)[0], "Recording the live image"
+    assert live not in state.text() and pressed.unfinished()
+    pressed.pause(True)
+    assert _advice(pressed)[0] != banner
+    qtbot.waitUntil(lambda: state.text().startswith(live), timeout=WAIT_MS)
+    pressed.pause(False)
+    assert _advice(pressed)[0] == banner
     recorder = pressed.recorder._recorder
     with recorder._changed:
         recorder._note(lost=7)
@@ -204,7 +211,7 @@ def test_a_recording_is_made_and_replayed(
     assert recorder._every == 2
     pressed.recorder.stop()
     qtbot.waitUntil(lambda: not pressed.recorder.busy, timeout=WAIT_MS)
-    assert not state.isVisible()
+    assert not state.isVisible() and not pressed.unfinished()
     context.toasts.clear()
 
     pressed.open_path(path)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QImage
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from app.live.image_checks import pixel_text
 from app.live.image_view import ImageView
@@ -63,6 +63,16 @@ def view(qtbot):
     for floating in (made._bar, made._checks):  # they cover pixels that the tests read
         floating.hide()
     return made
+
+
+def test_labels_without_text_are_hidden(view):
+    labels = [view.findChild(QLabel, f"live.{name}") for name in ("zoom", "exposure", "pixel")]
+    for show in (lambda: None, lambda: view.show_image(np.zeros((HEIGHT, WIDTH, 3), np.uint8))):
+        show()
+        assert all(label.text() or not label.isVisible() for label in labels)
+    assert any(label.isVisible() for label in labels)
+    view.set_stream(None)
+    assert not any(label.isVisible() for label in labels)
 
 
 def black() -> np.ndarray:

@@ -39,13 +39,16 @@ class Page(QWidget):
         super().__init__()
         self.events: list[str] = []
         self.opened: list[Path] = []
-        self.closable = True
+        self.closable, self.work = True, ""
 
     def enter(self) -> None:
         self.events.append("enter")
 
     def leave(self) -> None:
         self.events.append("leave")
+
+    def unfinished(self) -> str:
+        return self.work
 
     def can_close(self) -> bool:
         return self.closable
@@ -143,6 +146,18 @@ def test_a_slow_page_appears_when_it_is_loaded(window, qtbot, tmp_path, monkeypa
     qtbot.waitUntil(lambda: window.page_name == "calibrate")
     assert window.page("calibrate").events == ["enter", "begin demo"]
     del sys.modules["slow_page"]
+
+
+@pytest.mark.function("Be asked before closing ends a recording")
+def test_closing_asks_once_if_work_of_a_page_would_end(window):
+    window.page("sensors").work = "Work is running."
+    assert not window.close()
+    question = window.findChild(Dialog, "question")
+    assert "Work is running." in question.findChild(QLabel, "question.text").text()
+    question.reject()
+    assert window.isVisible() and not window.close()
+    window.findChild(Dialog, "question").findChild(QWidget, "question.answer0").click()
+    assert not window.isVisible()
 
 
 def test_a_page_can_keep_the_window_open_and_its_size_is_remembered(make_window, context):
