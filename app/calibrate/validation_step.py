@@ -40,7 +40,6 @@ from gelpolight_core.lab.validation_trial import (
     press_lines,
     refuse_source,
     validate,
-    what_decides,
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -145,7 +144,7 @@ class ValidationStep(Step):
         if validation.passed:
             in_use = self.context.workspace.in_use == self.model.saved_path
             return "pass", f"{word}: {largest}. {'In use' if in_use else 'Not in use'}."
-        return validation.verdict.value, f"{word}. {what_decides(validation.comparisons)}".strip()
+        return validation.verdict.value, f"{word}. {validation.what_decides}".strip()
 
     def number(self) -> Finding | None:
         """Return the largest error of the recorded validation."""
@@ -348,8 +347,8 @@ class ValidationStep(Step):
         set_text_role(self.result, role)
         self.verdict.setVisible(trial is not None and bool(trial.comparisons))
         if trial is not None and trial.comparisons:
-            advice = what_decides(trial.comparisons)
-            worst = f"{WORDS[trial.verdict]}, largest error {trial.largest_percent:.2g} %. {advice}"
+            largest = f"largest error {trial.largest_percent:.2g} %. {trial.what_decides}"
+            worst = f"{WORDS[trial.verdict]}, {largest}"
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
             self.verdict.setText(worst.strip() if recordable else doubtful)
             set_text_role(self.verdict, trial.verdict.value if recordable else "warn")

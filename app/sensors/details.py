@@ -26,7 +26,6 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.recipes import stage_title
-from gelpolight_core.lab.validation_trial import what_decides
 from gelpolight_core.session.validation import WORDS
 
 ItemT = TypeVar("ItemT")
@@ -304,9 +303,7 @@ def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> st
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""
     trial = entry.validation
-    validation = ["Not validated: press an object of known size to validate it"]
-    if trial is not None:
-        validation = [*trial.lines(), *filter(None, (what_decides(trial.comparisons),))]
+    none = ["Not validated: press an object of known size to validate it"]
     lines = [
         f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
         f"Made {made_cell(entry).text} {operator} from session {summary.session}, "
@@ -314,4 +311,4 @@ def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> st
         uses,
         summary.accepted and f"Used although it failed: {summary.accepted}",
     ]
-    return "\n".join((*filter(None, lines), *validation))
+    return "\n".join((*filter(None, lines), *(none if trial is None else trial.lines())))

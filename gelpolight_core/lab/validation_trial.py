@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gelpolight_core.base.compared_quantity import COVERAGE, REFERENCE, REST, SOURCES, Quantity
+from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Verdict
 from gelpolight_core.base.user_name import user_name
@@ -17,16 +16,6 @@ from gelpolight_core.session.reference_object import SHAPES, ReferenceObject
 from gelpolight_core.session.validation import Validation, worst_decision
 
 from .reference_press import ReferencePress
-
-SMALLER = {
-    "calibration": "capture more images for the scale",
-    "noise": "use more light",
-    REFERENCE: "state a more exact reference",
-    REST: "press again with a clean object",
-}
-"""What makes each source of an uncertainty smaller, as far as something does."""
-BALLS = "press more balls for the calibration"
-"""The same for the calibration's part of a height."""
 
 
 def object_name(truth: ReferenceObject) -> str:
@@ -100,28 +89,6 @@ def refuse_source(image: Path, sources: Collection[str]) -> None:
     """
     if file_hash(image) in sources:
         raise InputError("This press was used for the calibration", image, Remedy.CAPTURE_AGAIN)
-
-
-def what_decides(comparisons: Iterable[Quantity]) -> str:
-    """Return what would decide the length with the largest uncertainty, "" if all are decided."""
-    percents = {
-        100.0 * q.deviation_expanded / q.truth: q
-        for q in comparisons
-        if q.verdict is Verdict.WARN and q.truth is not None
-    }
-    if not percents:
-        return ""
-    percent = max(percents)
-    q = percents[percent]
-    source, _ = max(q.budget, key=lambda row: row[1])
-    action = BALLS if (source, q.label) == ("calibration", "height") else SMALLER.get(source, "")
-    # Rounded up: a tolerance of exactly this value must be enough.
-    enough = math.ceil(10.0 * (abs(q.error_percent or 0.0) + percent)) / 10.0
-    return (
-        f"The uncertainty of the {q.label} is ± {percent:.2g} % (k = {COVERAGE:g}), the tolerance "
-        f"{q.limit_percent:g} %. Its largest part is {SOURCES.get(source, source)}"
-        f"{action and f': {action}'}. A tolerance of {enough:g} % can be decided."
-    )
 
 
 def press_lines(press: ReferencePress, limits_percent: tuple[float, float]) -> tuple[str, str]:

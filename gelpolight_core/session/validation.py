@@ -7,13 +7,14 @@ none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.compared_quantity import COVERAGE, REFERENCE, REST, SOURCES, Quantity
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.base.safe_reading import parse_time, plain_text, read_program_file, short_repr
@@ -27,6 +28,15 @@ WORDS = {
     Verdict.FAIL: "Validation failed",
 }
 """Whether a calibration is validated, from the worst decision on a length."""
+SMALLER = {
+    "calibration": "capture more images for the scale",
+    "noise": "use more light",
+    REFERENCE: "state a more exact reference",
+    REST: "press again with a clean object",
+}
+"""What makes each part of an uncertainty smaller, as far as something does."""
+BALLS = "press more balls for the calibration"
+"""The same for the calibration's part of a height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +78,37 @@ class Validation:
         """The largest error of a length, without its sign."""
         return max(abs(c.error_percent or 0.0) for c in self.comparisons)
 
+    @property
+    def what_decides(self) -> str:
+        """What would decide the length with the largest uncertainty. Empty if all are decided."""
+        undecided = {
+            100.0 * c.deviation_expanded / c.truth: c
+            for c in self.comparisons
+            if c.verdict is Verdict.WARN and c.truth is not None
+        }
+        if not undecided:
+            return ""
+        percent, compared = max(undecided.items(), key=lambda item: item[0])
+        part, _ = max(compared.budget, key=lambda row: row[1])
+        is_depth = part == "calibration" and compared.label == "height"
+        action = BALLS if is_depth else SMALLER.get(part, "")
+        # Rounded up: a tolerance of this value must be enough.
+        enough = math.ceil(10.0 * (abs(compared.error_percent or 0.0) + percent)) / 10.0
+        return (
+            f"The uncertainty of the {compared.label} is ± {percent:.2g} % (k = {COVERAGE:g}), "
+            f"the tolerance {compared.limit_percent:g} %. Its largest part is "
+            f"{SOURCES.get(part, part)}{action and f': {action}'}. "
+            f"A tolerance of {enough:g} % can be decided."
+        )
+
     def lines(self) -> list[str]:
-        """Return it in words: its verdict, object and origin, then each length."""
+        """Return it in words: verdict, object and origin, each length, and what would decide."""
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
         by = f"by {self.who}" if self.who else ""
         head = f"{WORDS[self.verdict]}: {self.indenter}, {day} {by}".rstrip()
-        return [head, *(quantity.sentence for quantity in self.comparisons)]
+        sentences = [quantity.sentence for quantity in self.comparisons]
+        return [head, *sentences, *filter(None, (self.what_decides,))]
 
     def as_json(self) -> dict[str, Any]:
         """Return the validation as plain values."""

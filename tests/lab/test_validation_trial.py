@@ -7,7 +7,8 @@ import pytest
 from gelpolight_core.base.compared_quantity import REFERENCE, REST, Quantity
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Verdict
-from gelpolight_core.lab.validation_trial import BALLS, SMALLER, refuse_source, what_decides
+from gelpolight_core.lab.validation_trial import refuse_source
+from gelpolight_core.session.validation import BALLS, SMALLER, Validation
 
 
 @pytest.mark.function("Refuse a press for the validation that the calibration was made from")
@@ -36,10 +37,10 @@ def test_what_decides_names_the_largest_part_and_a_tolerance_that_is_enough(
     pair = Quantity(name, 1.01, 0.029, 1.0, 5.0, truth_sd, tuple(parts.items()))
     decided = Quantity("side", 4.0, 0.001, 4.0, 5.0)
     assert pair.verdict is Verdict.WARN
-    sentence = what_decides((decided, pair))
+    sentence = Validation("id", "", "", "x", (decided, pair)).what_decides
     assert action in sentence
     enough = float(sentence.partition("A tolerance of ")[2].partition(" %")[0])
     judged = Quantity(name, 1.01, 0.029, 1.0, enough, truth_sd)
     assert judged.verdict is Verdict.PASS
     assert Quantity(name, 1.01, 0.029, 1.0, enough - 0.1, truth_sd).verdict is Verdict.WARN
-    assert what_decides((decided,)) == ""
+    assert Validation("id", "", "", "x", (decided,)).what_decides == ""
