@@ -16,6 +16,7 @@ from app.widgets.widget_names import set_names
 from gelpolight_core.output.report.result_pictures import (
     DIVERGING,
     LED_ROLES,
+    MOST_NAMES,
     Bars,
     Field,
     Label,
@@ -116,8 +117,14 @@ class ResultPlot(QFrame):
                 at = np.arange(len(names))
                 bars = pg.BarGraphItem(x=at, height=values, width=0.7, brushes=brushes, pen=None)
                 self.plot.addItem(bars)
-                texts = [name.removeprefix("ball_") for name in names]
-                self.plot.getAxis("bottom").setTicks([list(zip(at, texts, strict=True))])
+                # Names of many bars would overlap.
+                named = zip(at, names, roles, strict=True)
+                texts = [
+                    (place, name.removeprefix("ball_"))
+                    for place, name, role in named
+                    if len(names) <= MOST_NAMES or role == "warn"
+                ]
+                self.plot.getAxis("bottom").setTicks([texts])
             case Line(x, y, role, name):
                 self.plot.plot(x, y, pen=pg.mkPen(_colour(role), width=2), name=name or None)
             case Label(x, y, text, role):

@@ -41,7 +41,7 @@ BALL_MM = 10.0
 INWARDS = 0.78
 """Place of an LED's text between the middle and the LED."""
 MOST_NAMES = 20
-"""Contacts that are named in the plan. Chosen: names of more would overlap."""
+"""Presses that are named in a picture. Chosen: names of more would overlap."""
 BOARDS = "Grey: corners of the board on the top surface."
 ELLIPSE_MM = 1.0
 """Length of the largest half axis of the drawn uncertainty of an LED."""
