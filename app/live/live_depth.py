@@ -13,6 +13,7 @@ from app.program.jobs import JobQueue
 from app.sources.latest import Done
 from app.sources.source import SourceFrame, SourceInfo
 from app.views.map.colour_range import ColourRange
+from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.health.health_monitor import HealthMonitor
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -198,8 +199,7 @@ class LiveDepth(QObject):
         hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
         texts = [f"{hz:.0f} shown/s, {self.last.total_ms:.0f} ms"]
         if heightmap.visible_depth_mm is not None:
-            um = 1e3 * heightmap.visible_depth_mm
-            texts.append(f"visible depth {um:.0f} um")
+            texts.append(f"visible depth {value_text(heightmap.visible_depth_mm)}")
         return ", ".join(texts)
 
     def trace_text(self) -> str:

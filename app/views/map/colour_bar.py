@@ -9,6 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor, QFont, QTransform
 
 from app.widgets import theme
+from gelpolight_core.base.compared_quantity import unit_behind
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 BAR_PX, HISTOGRAM_PX, AXIS_PX, UNIT_PX = 12, 10, 38, 16
@@ -143,7 +144,7 @@ class ColourBar(pg.ColorBarItem):  # type: ignore[misc]
         self.region.setHoverBrush(QColor(255, 255, 255, 40))
 
     def _write_unit(self) -> None:
-        self._label.setText(self._unit, color=theme.colour("text"))
+        self._label.setText(unit_behind(self._unit).strip(), color=theme.colour("text"))
 
 
 def depth_counts(heightmap: HeightMap, range_mm: tuple[float, float]) -> NDArray[np.intp]:

@@ -16,6 +16,7 @@ from app.widgets.label import placeholder
 from app.widgets.plots import own_plot_menus
 from app.widgets.units import length_text, round_length_mm
 from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import unit_behind
 from gelpolight_core.geometry.resampling import MembraneGrid
 from gelpolight_core.reconstruction.height_map import HeightMap
 
@@ -236,7 +237,7 @@ class MapView(FittedView):
     ) -> None:
         """Show the colour bar with a range, its numbers times a factor."""
         self.bar.show_range(colours, low, high, unit, factor=factor)
-        words = f"{low * factor:.3g} … {high * factor:.3g} {unit}"
+        words = f"{low * factor:.3g} … {high * factor:.3g}{unit_behind(unit)}"
         if words != self.accessibleDescription():
             self.setAccessibleDescription(words)
 

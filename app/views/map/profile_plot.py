@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, Qt, Signal
 
 from app.widgets.plots import apply_theme, without_menus
 from app.widgets.widget_names import set_names
-from gelpolight_core.base.compared_quantity import readable_unit
+from gelpolight_core.base.compared_quantity import readable_unit, unit_behind
 from gelpolight_core.measurement.profile import Profile
 
 LINE_INK = "#e0309f"
@@ -88,7 +88,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         """Write the depths of the visible range in one unit."""
         unit, factor = readable_unit(*self.getViewBox().viewRange()[1])
         self.getAxis("left").setScale(factor)
-        self.setLabel("left", f"depth ({unit})")
+        self.setLabel("left", f"depth ({unit_behind(unit).strip()})")
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)

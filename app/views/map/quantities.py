@@ -9,6 +9,7 @@ import numpy as np
 from app.views.surface.display_surface import ColourScale
 from app.widgets.units import round_up
 from gelpolight_core.base.arrays import Float32Array
+from gelpolight_core.base.compared_quantity import UNITS
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 from .colour_tables import colour_table
@@ -49,10 +50,13 @@ def slope_scale() -> ColourScale:
 
 
 def uncertainty_scale(sd_um: Float32Array) -> ColourScale:
-    """Return the scale of standard deviations in um. One pixel in a hundred is above it."""
+    """Return the scale of standard deviations in µm. One pixel in a hundred is above it."""
     top = float(np.percentile(sd_um, 99.0)) if sd_um.size else LEAST_SD_UM
     return ColourScale(
-        "1 sd [um]", colour_table("inferno"), 0.0, round_up(max(round(top, 4), LEAST_SD_UM))
+        f"1 sd [{UNITS['um']}]",
+        colour_table("inferno"),
+        0.0,
+        round_up(max(round(top, 4), LEAST_SD_UM)),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.base.arrays import Float64Array, PointXY
-from gelpolight_core.base.compared_quantity import readable_unit, value_text
+from gelpolight_core.base.compared_quantity import readable_unit, unit_behind, value_text
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 _STEPS = 512
@@ -136,7 +136,7 @@ class ColourScale:
         if MM not in self.title:
             return self
         unit, factor = readable_unit(self.low, self.high)
-        title = self.title.replace(MM, f"[{unit}]")
+        title = self.title.replace(MM, f"[{unit_behind(unit).strip()}]")
         return replace(self, title=title, low=factor * self.low, high=factor * self.high)
 
 
@@ -160,8 +160,8 @@ class DisplaySurface:
         Meaning of the colours.
     range_mm : (low, high)
         Depths at the ends of the depth axis. Steady from frame to frame.
-    axis : str
-        Title of the depth axis.
+    curved : bool
+        Whether it is the surface of a curved membrane itself, not its indentation.
     light : (x, y, z) or None
         Unit vector to the lamp, x right, y down, z out of the surface. None: the texture is
         already shaded.
@@ -174,8 +174,13 @@ class DisplaySurface:
     texture: NDArray[np.uint8]
     scale: ColourScale
     range_mm: tuple[float, float]
-    axis: str
+    curved: bool
     light: tuple[float, float, float] | None = None
+
+    @property
+    def axis(self) -> str:
+        """Title of the depth axis."""
+        return "\N{MINUS SIGN}height (mm)" if self.curved else "depth (mm)"
 
     def thinned(self, largest: int) -> DisplaySurface:
         """Return it with at most this many nodes per side. The texture keeps its detail."""
@@ -300,6 +305,6 @@ def surface_of(
         texture=texture,
         scale=scale,
         range_mm=range_mm,
-        axis="depth (mm)" if heightmap.at_rest.flat else "\N{MINUS SIGN}height (mm)",
+        curved=not heightmap.at_rest.flat,
         light=light,
     )

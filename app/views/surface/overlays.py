@@ -185,8 +185,8 @@ def axes_marks(
     tick = 0.015 * (right - left)
     # Start and end of each axis, direction of its ticks, places and values of these, title.
     axes = (
-        ((left, near, 0.0), (right, near, 0.0), (0.0, -tick, 0.0), x, x, "x (mm)"),
-        ((left, near, 0.0), (left, far, 0.0), (-tick, 0.0, 0.0), y, -y, "y (mm)"),
+        ((left, near, low), (right, near, low), (0.0, -tick, 0.0), x, x, "x (mm)"),
+        ((left, near, low), (left, far, low), (-tick, 0.0, 0.0), y, -y, "y (mm)"),
         ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, depth_title),
     )
     ends, points, texts = list[Float64Array](), list[Float64Array](), list[str]()
@@ -236,25 +236,27 @@ def draw_scale(
     bar.GetAnnotationTextProperty().SetColor(pv.Color(ink.text).float_rgb)
 
 
-def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours) -> None:
-    """Show the exaggeration of the depth, unless it is 1."""
+def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours, *, curved: bool) -> None:
+    """Show the exaggeration of the depth, unless it is 1, or that the membrane is curved."""
     _remove(plotter, "note")
-    if style.exaggeration != 1.0:
+    if curved or style.exaggeration != 1.0:
         text = f"Depth scaled {style.exaggeration:g} times"
+        if curved:
+            text = "Curved membrane, not scaled"
         _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
 
 
 def draw_scale_bar(plotter: Plotter, box: Box, style: DisplaySettings, ink: SceneColours) -> None:
-    """Draw a bar of round length in the membrane's plane, below the surface's lower edge."""
+    """Draw a bar of round length at the foot of the box, below the surface's lower edge."""
     _remove(plotter, "scale-bar", "scale-bar-length")
     if not style.scale_bar:
         return
     length = round_length_mm(0.25 * (box[1] - box[0]))
     side = box[3] - box[2]
     y = box[2] - 0.22 * side
-    line = pv.Line((box[0], y, 0.0), (box[0] + length, y, 0.0))
+    line = pv.Line((box[0], y, box[4]), (box[0] + length, y, box[4]))
     plotter.add_mesh(line, name="scale-bar", color=ink.text, line_width=4, **PLAIN)
-    at, text = [(box[0] + 0.5 * length, y - 0.07 * side, 0.0)], [length_text(length)]
+    at, text = [(box[0] + 0.5 * length, y - 0.07 * side, box[4])], [length_text(length)]
     _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink, always_visible=True)
 
 

@@ -25,6 +25,7 @@ from .overlays import (
     OverlayActor,
     Plotter,
     SceneColours,
+    axes_marks,
     box_of,
     cut_edge,
     draw_axes,
@@ -38,7 +39,7 @@ from .overlays import (
 )
 from .surface_mesh import SurfaceActor
 
-# Around the surface, left and right, above and below: the labels of the axes reach into it.
+# Around surface and axes, left and right, above and below: half of an axis' title.
 MARGIN_PX = np.array([48.0, 48.0])
 
 Clip = tuple[Float64Array, Float64Array]
@@ -57,7 +58,7 @@ class Scene:
     surface : DisplaySurface or None
         Current surface.
     style : DisplaySettings
-        Current style.
+        Current style. A curved membrane is not stretched: its shape would be another.
     clip : (normal, origin) or None
         Plane in the scene's frame; the side that its normal points to is hidden.
     box : tuple of 6 floats
@@ -68,6 +69,7 @@ class Scene:
         self._plotter = plotter
         self.surface: DisplaySurface | None = None
         self.style, self._ink = DisplaySettings(exaggeration=1.0), SceneColours()
+        self._chosen = self.style
         self.clip: Clip | None = None
         self.box: Box | tuple[()] = ()
         self._sheet = SurfaceActor(plotter)
@@ -84,11 +86,13 @@ class Scene:
 
     def show_surface(self, surface: DisplaySurface) -> None:
         """Show the surface of a frame."""
-        first, self.surface = self.surface is None, surface
+        before, self.surface = self.surface, surface
         self._sheet.show(surface)
+        if before is None or before.curved != surface.curved:
+            self.set_style(self._chosen)
         self._explain()
         self._lay_overlays()
-        if first:
+        if before is None:
             self.view_from("isometric")
 
     def coarsen(self) -> None:
@@ -102,6 +106,9 @@ class Scene:
 
     def set_style(self, style: DisplaySettings) -> None:
         """Apply a style: visible parts and exaggeration of the depth."""
+        self._chosen = style
+        if self.surface is not None and self.surface.curved:
+            style = replace(style, exaggeration=1.0)
         stretched, self.style = style.exaggeration != self.style.exaggeration, style
         self._plotter.camera.parallel_projection = style.parallel
         self._sheet.actor.prop.style = "wireframe" if style.wireframe else "surface"
@@ -132,7 +139,7 @@ class Scene:
         self._explained, self.box = explained, box_of(surface, style.exaggeration)
         draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
-        draw_note(self._plotter, style, self._ink)
+        draw_note(self._plotter, style, self._ink, curved=surface.curved)
         draw_scale_bar(self._plotter, self.box, style, self._ink)
 
     # Overlays on the surface
@@ -198,13 +205,15 @@ class Scene:
     def fit(self) -> None:
         """Show the whole surface from the current camera direction, as large as possible."""
         surface = self.surface
-        if surface is None:
+        if surface is None or not self.box:
             return
         ends = surface.x_mm[:, [0, -1]].ravel()
         rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)]).astype(np.float64)
         points: Float64Array = np.vstack(
             [np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]]
         )
+        if self.style.axes:
+            points = np.vstack([points, axes_marks(self.box, self.style.exaggeration, "")[1]])
         points = np.insert(points, 3, 1.0, axis=1)
         self._plotter.renderer.reset_camera(render=False, bounds=self.box)
         size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
@@ -255,7 +264,7 @@ class Scene:
         other.set_ink(ink or self._ink)
         if self.surface is not None:
             other.show_surface(self.surface)
-        other.set_style(self.style)
+        other.set_style(self._chosen)
         other.show_lines(self._lines)
         other.show_pins(*self._pins)
         other.show_solid(self._solid)

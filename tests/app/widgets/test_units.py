@@ -35,7 +35,7 @@ def test_an_axis_and_a_colour_bar_have_one_unit_for_all_numbers(dome, qtbot):
     assert "x 2.00" in read_at(dome, 2.0, -1.0).detail()
     table = np.zeros((256, 3), np.uint8)
     scale = ColourScale("depth [mm]", table, -0.01, 0.05).in_unit()
-    assert (scale.title, scale.low, scale.high) == ("depth [um]", -10.0, 50.0)
+    assert (scale.title, scale.low, scale.high) == ("depth [µm]", -10.0, 50.0)
     deep = ColourScale("depth [mm]", table, -0.01, 0.5).in_unit()
     assert (deep.title, deep.low, deep.high) == ("depth [mm]", -0.01, 0.5)
     slope = ColourScale("slope [°]", table, 0.0, 0.05)
@@ -43,7 +43,7 @@ def test_an_axis_and_a_colour_bar_have_one_unit_for_all_numbers(dome, qtbot):
     plot = ProfilePlot("plot")
     qtbot.addWidget(plot)
     axis = plot.getAxis("left")
-    for share, factor, unit in ((0.05, 1e3, "um"), (1.0, 1.0, "mm")):
+    for share, factor, unit in ((0.05, 1e3, "µm"), (1.0, 1.0, "mm")):
         pressed = replace(dome, depth_mm=share * dome.depth_mm)
         plot.show_profile(take_profile(pressed, (-2.0, 0.0), (2.0, 0.0)))
         assert axis.scale == factor and unit in axis.labelText

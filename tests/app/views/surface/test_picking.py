@@ -39,7 +39,7 @@ def _ramp():  # type: ignore[no-untyped-def]
     return DisplaySurface(
         x.astype(np.float32), y[:, 0].astype(np.float32), (0.1 * x).astype(np.float32),
         (-9.0, -9.0, 9.0, 9.0), np.zeros((4, 4, 3), np.uint8), ColourScale("", table, 0.0, 1.0),
-        (-0.9, 0.9), "depth (mm)",
+        (-0.9, 0.9), curved=False,
     )  # fmt: skip
 
 

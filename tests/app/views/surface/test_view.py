@@ -3,6 +3,7 @@
 import gc
 import itertools
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,6 +126,20 @@ def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(panel, qtbot):
     qtbot.mouseMove(view, QPoint(200, 120))
     qtbot.mouseRelease(view, Qt.MouseButton.RightButton, pos=QPoint(200, 120))
     assert len(asked) == 1 and view.camera.position != before
+
+
+def test_a_curved_membrane_is_not_stretched_and_all_axes_are_in_the_window(panel, made):
+    panel.display.change(exaggeration=5.0)
+    scene = panel.view.scene  # type: ignore[union-attr]
+    panel.show_surface(replace(made(), curved=True, range_mm=(-2.0, 1.0)))
+    assert scene.box[4:] == pytest.approx((-2.0, 1.0)) and scene.style.exaggeration == 1.0
+    ends, points, _ = axes_marks(scene.box, 1.0, "title")
+    assert ends[:, 2].min() == ends[0, 2] == scene.box[4]  # x and y lie below the membrane
+    panel.view_from("isometric")
+    low, high = scene._seen(np.insert(points, 3, 1.0, axis=1))
+    assert (low > -1.0).all() and (high < 1.0).all()
+    panel.show_surface(made())
+    assert scene.style.exaggeration == 5.0 and scene.box[5] == pytest.approx(5.0)
 
 
 @pytest.mark.function("Exaggerate the depth while the axes stay true")
