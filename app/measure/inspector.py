@@ -24,7 +24,6 @@ from gelpolight_core.session.reference_object import LENGTHS, ReferenceObject
 
 from .press_state import PressState, ResultRow
 
-FIELD_PX = 74
 AGAIN = "\0again"
 """The entry that states the values of the press before. No name of an object is like it."""
 
@@ -52,9 +51,7 @@ class ReferenceForm(QWidget):
         self.known = set_names(box, "measure.reference.known", "Known object")
         self.known.activated.connect(lambda _index: self._on_known())
         edit = tool_button("measure.reference.edit", "Edit…", on_edit, tip="Edit the known objects")
-        self.form = Form(ReferenceObject(""), "measure.reference", only=LENGTHS)
-        for field in self.form.inputs.values():
-            field.setMinimumWidth(FIELD_PX)
+        self.form = Form(ReferenceObject(""), "measure.reference", only=LENGTHS, narrow=True)
         self.form.changed.connect(lambda _name, _value: self._on_typed())
         vbox(hbox((self.known, 1), edit, spacing=4), self.form, of=self, margins=0)
 

@@ -279,7 +279,9 @@ class MeasurementModel(QObject):
 
     def _on_proposal(self, proposal: DetectedShape | None) -> None:
         if proposal is None:
-            self.answer = "No ball, cylinder or cuboid was found. Press one, or use other tools."
+            self.answer = (
+                "No ball, cylinder or cuboid was found. Press one, or use the other tools."
+            )
             return
         if len(proposal.candidates) > 1:
             names = " and ".join(palette_entry(shape).label for shape in proposal.candidates)

@@ -203,8 +203,10 @@ class Quantity:
         if not self.decision:
             return ""
         en = "" if self.en is None else f", En {self.en:.2f}"
-        why = "" if self.explained else ". The deviation is larger than the uncertainties explain"
-        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}{why}"
+        text = f"{self.decision}, tolerance {self.limit_percent:g} %{en}"
+        if self.explained or self.verdict is Verdict.FAIL:
+            return text
+        return f"{text}. The deviation is larger than the uncertainties explain"
 
     @property
     def sentence(self) -> str:
