@@ -255,15 +255,19 @@ class BallsStep(ImageStep):
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Offer the diameter that fits a press which disagrees with the others."""
+        for name, diameter_mm in self.fitting_diameters():
+            text = f"Set {Path(name).stem} to {diameter_mm:.3g} mm"
+            fit = partial(self.model.set_ball_diameter, name, diameter_mm)
+            return (text, fit), ("Repeat it", partial(self.repeat, name))
+        return super().remedies(state)
+
+    def fitting_diameters(self) -> Iterable[tuple[str, float]]:
+        """Yield name and fitting diameter (mm) of each press that disagrees with the others."""
         balls = self.results.get(BALLS) if REFLECTANCE.key in self.model.statuses else None
         for press in () if balls is None else balls.presses:
             agreement = _agreement(press, self.project)
             if agreement is not None and agreement.fault is not None:
-                diameter_mm, name = 2.0 * agreement.radius_mm, Path(press.name).name
-                text = f"Set {Path(name).stem} to {diameter_mm:.2g} mm"
-                fit = partial(self.model.set_ball_diameter, name, float(f"{diameter_mm:.2g}"))
-                return (text, fit), ("Repeat it", partial(self.repeat, name))
-        return super().remedies(state)
+                yield Path(press.name).name, float(f"{2.0 * agreement.radius_mm:.2g}")
 
     def note(self, name: str) -> str:
         """Return the diameter of the ball of a press."""

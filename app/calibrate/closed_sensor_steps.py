@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -11,8 +12,9 @@ import numpy as np
 
 from app.live.overlay import ImageOverlay, OverlayCircle, OverlayMarker
 from gelpolight_core.base.arrays import Float32Array, PixelArray
-from gelpolight_core.base.finding import Finding, QualityTable, finding_from_error
+from gelpolight_core.base.finding import Finding, QualityTable, Verdict, finding_from_error
 from gelpolight_core.calibration.closed_sensor.pixel_scale import find_pins, find_punch
+from gelpolight_core.calibration.closed_sensor.press_sizes import PressSize
 from gelpolight_core.calibration.closed_sensor.slope_calibration import LEAST_PRESSES, contact_in
 from gelpolight_core.calibration.closed_sensor_recipe import BALLS, SCALE
 from gelpolight_core.calibration.closed_sensor_stages import (
@@ -284,11 +286,24 @@ class InPlaceBallsStep(BallsStep):
         fault = run.result.refused.get(path.name)
         if fault is not None:
             return finding_from_error(fault)
+        remedy = next((size.remedy for size in self._wrong_sizes() if size.name == path.name), "")
+        verdict = Verdict.WARN if remedy else Verdict.PASS
         for press in run.result.presses:
             if press.name == path.name:
                 error = press.held_out.normal_deg
-                return Finding("normal_error_deg", "Normal error", error, "deg")
+                finding = Finding("normal_error_deg", "Normal error", error, "deg")
+                return replace(finding, verdict=verdict, remedy=remedy)
         return None
+
+    def _wrong_sizes(self) -> list[PressSize]:
+        """Return the presses whose present diameter contradicts the others."""
+        run, radius_mm = self._run(), self.session.ball_radius_mm
+        sizes = () if run is None else run.sizes
+        return [s for s in sizes if s.remedy and 2.0 * radius_mm(s.name) == s.stated_mm]
+
+    def fitting_diameters(self) -> Iterable[tuple[str, float]]:
+        """Yield name and fitting diameter (mm) of each press that disagrees with the others."""
+        return ((size.name, size.proposed_mm) for size in self._wrong_sizes())
 
     def is_finished(self, state: str) -> bool:
         """Return whether more presses do not help."""

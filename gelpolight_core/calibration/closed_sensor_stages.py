@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,6 +32,7 @@ from gelpolight_core.calibration.closed_sensor.pixel_scale import (
 from gelpolight_core.calibration.closed_sensor.plausibility import judge_kind
 from gelpolight_core.calibration.closed_sensor.preset import stated_sizes
 from gelpolight_core.calibration.closed_sensor.press_light_change import BallImage
+from gelpolight_core.calibration.closed_sensor.press_sizes import PressSize, press_sizes
 from gelpolight_core.calibration.closed_sensor.slope_calibration import (
     BACKGROUND_ADVICE,
     InPlaceResult,
@@ -63,15 +64,18 @@ class SlopesStageResult:
         Presses, model and ridge.
     noise : (3,)
         Standard deviation of a pixel of a single image, per channel.
+    sizes : tuple of PressSize
+        The used press that contradicts the others most, and the sizes of presses left out.
     """
 
     result: InPlaceResult
     noise: NDArray[np.float64]
+    sizes: tuple[PressSize, ...] = ()
 
     @property
     def tables(self) -> dict[str, QualityTable]:
         """The tables of figures by their keys."""
-        return judge_in_place(self.result)
+        return judge_in_place(self.result, self.sizes)
 
     @property
     def quality(self) -> QualityTable:
@@ -180,7 +184,12 @@ def find_slopes(
     result = calibrate_in_place(
         background.rgb, presses, grid, noise, scale_sd=scale_sd, towards=towards, progress=progress
     )
-    return SlopesStageResult(replace(result, refused={**result.refused, **unreadable}), noise)
+    sizes, refused = press_sizes(presses, result, noise, towards), {**result.refused, **unreadable}
+    for size in sizes:
+        if size.remedy and (fault := refused.get(size.name)) is not None:
+            text = f"{fault.found}; the other presses fit {size.proposed_mm:.3g} mm"
+            refused[size.name] = InputError(text, size.name, Remedy.CHECK_RADIUS)
+    return SlopesStageResult(replace(result, refused=refused), noise, sizes)
 
 
 def in_place_calibration(
@@ -284,8 +293,16 @@ def _noise(rgb: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(SD_OF_MEDIAN * spread, np.float64)
 
 
-def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
-    """Judge an in-place calibration by the presses that were left out."""
+def judge_in_place(result: InPlaceResult, sizes: Sequence[PressSize]) -> dict[str, QualityTable]:
+    """Judge an in-place calibration by the presses that were left out.
+
+    Parameters
+    ----------
+    result : InPlaceResult
+        The calibration.
+    sizes : sequence of PressSize
+        Sizes of presses; those of presses left out have no figure.
+    """
     held_out = [press.held_out for press in result.presses]
     caps = np.array([press.cap_ratio for press in held_out])
     widths = np.array([press.diameter_ratio for press in held_out])
@@ -335,6 +352,7 @@ def judge_in_place(result: InPlaceResult) -> dict[str, QualityTable]:
                     "deg",
                 ),
                 *kind,
+                *(size.figure for size in sizes if size.name not in result.refused),
             )
         ),
         "in_place": QualityTable(
@@ -397,7 +415,7 @@ def _learning_figures(result: InPlaceResult) -> tuple[Finding, ...]:
     return (
         judge(
             "next_ball_gain_percent",
-            "Smaller slope error by one more ball",
+            "Slope error that one more ball is expected to remove",
             100.0 * gain,
             "%",
             warn=100.0 * SETTLED,

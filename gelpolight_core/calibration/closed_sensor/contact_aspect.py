@@ -79,7 +79,7 @@ def judge_stretch(stretch: ContactAspect | None, grid: WorkingGrid) -> tuple[Fin
     return (
         judge(
             "contact_stretch_percent",
-            "Contacts higher or wider than round",
+            "Difference between height and width of the contacts",
             100.0 * abs(stretch.log_ratio),
             "%",
             warn=DOUBTFUL_SIGMAS * 100.0 * stretch.sd,

@@ -119,7 +119,7 @@ def brightness_figure(small: Float32Array, area: BoolArray) -> Finding:
     dimmest = int(np.argmin(brightest))
     return judge(
         "brightest_percent",
-        f"Brightest {CHANNEL_KEYS[dimmest]} value, the dimmest colour",
+        f"Brightness of the darkest colour ({CHANNEL_KEYS[dimmest]}), its brightest pixels",
         float(brightest[dimmest]),
         "%",
         warn=25.0,

@@ -112,6 +112,24 @@ def test_a_contact_is_moved_by_hand_and_undo_returns_to_the_found_one(
     assert not project.session.decisions.balls
 
 
+@pytest.mark.function("Correct a wrong diameter of a closed sensor's ball with a button")
+def test_a_wrong_diameter_is_amber_and_a_button_corrects_it(
+    technician, small_session_of_ten_balls, tmp_path
+):
+    project = closed_project(small_session_of_ten_balls, tmp_path, balls=10)
+    name = project.session.found("balls")[0].name
+    project.set_ball_radius(name, 4.0)
+    technician.begin(project, "balls")
+    assert technician.state("balls") == "warn"
+    captures = technician.wizard.model.page.captures
+    assert [c.path.name for c in captures if c.state == "warn"] == [name]
+    assert "6 mm" in technician.see("calibrate.remedy0").text()
+    technician.click("calibrate.remedy0")
+    technician.rest()
+    assert project.session.ball_radius_mm(name) == 3.0
+    assert all(capture.state == "pass" for capture in technician.wizard.model.page.captures)
+
+
 @pytest.mark.function("See the images of a session while another sensor is the source")
 def test_the_images_of_another_sensor_are_not_shown_in_the_session(
     technician, small_session, tmp_path
