@@ -190,7 +190,7 @@ class RecordsView(QWidget):
         record = self.table.chosen()
         if record is None or column == NOTE:
             return
-        file = record.settings.get(FILE, "")
+        file = str(record.settings.get(FILE, ""))
         if Path(file).is_file():
             self._on_open(Path(file))
         else:

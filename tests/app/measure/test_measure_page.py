@@ -180,6 +180,7 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
 @pytest.mark.function(
     "State the edge radius of an object in the window",
     "List all measurements, delete some and restore them, export CSV",
+    "Open the image of a record again with a double click",
 )
 @pytest.mark.usefixtures("library")
 def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
