@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
-from PySide6.QtCore import QSignalBlocker
+from PySide6.QtCore import QSignalBlocker, QTimer
 from PySide6.QtWidgets import QWidget
 
 from app.program.calibration_entries import read_entry
@@ -31,16 +31,10 @@ from gelpolight_core.base.errors import InputError, as_input_error, error_messag
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import read_calibration
-from gelpolight_core.lab.evaluation_run import MeasurementOrReason, measure_press
+from gelpolight_core.lab.evaluation_run import MeasurementOrReason, measure_press, refuse_source
 from gelpolight_core.lab.press_folder import FOLDER, add_presses, leave_out
 from gelpolight_core.lab.reference_press import ReferencePress, listed_presses
-from gelpolight_core.lab.validation_trial import (
-    is_recordable,
-    object_name,
-    press_lines,
-    refuse_source,
-    validate,
-)
+from gelpolight_core.lab.validation_trial import is_recordable, object_name, press_lines, validate
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.reference_object import LENGTHS, SHAPES, ReferenceObject
@@ -234,20 +228,22 @@ class ValidationStep(Step):
         """Select the calibration of the present captures, or the newest one of the session."""
         project = self.project
         session, present = project.session, project.all_inputs
-        try:
-            entries = self.context.workspace.entries()
-        except InputError as error:
-            self.context.toasts.show(str(error), "warn")
-            return
+        entries = self.context.toasts.read_list(self.context.workspace.entries)
+        to_validate = self.context.workspace.to_validate
         candidates = [
-            (entry.summary.inputs != present, entry.path)
+            (entry.path != to_validate, entry.summary.inputs != present, entry.path)
             for entry in entries
             if entry.summary is not None
             and entry.summary.session == session.folder.name
             and entry.serial == session.serial
         ]
         if candidates:
-            self.model.use_calibration(min(candidates, key=lambda candidate: candidate[0])[1])
+            *_, path = min(candidates, key=lambda candidate: candidate[:2])
+            self.model.use_calibration(path)
+            if path == to_validate:
+                self.context.workspace.to_validate = None
+                # Not at once: the wizard is not made yet, and then shows another step.
+                QTimer.singleShot(0, self.area, partial(self.model.step_requested.emit, self.key))
 
     def _recorded(self) -> Validation | None:
         path = self.model.saved_path
@@ -387,13 +383,8 @@ class ValidationStep(Step):
 
     def import_press(self, path: Path) -> None:
         """Measure a press from an image file, of the object that its folder states, if any."""
-        calibration = self.model.saved_path
-        if calibration is None:
-            self._refuse(self.calibration.text())
-            return
         with self._errors():
-            if (summary := read_entry(calibration).summary) is not None:
-                refuse_source(path, summary.sources)
+            refuse_source(path, {i.sha256 for i in self.project.recipe.files(self.session)})
             frame = read_raw(path)
             truths = {press.file: press.truth for press in listed_presses(path.parent)}
             truth = truths.get(path.name)
@@ -432,7 +423,6 @@ class ValidationStep(Step):
         def work(_progress: object) -> tuple[Reconstructor, MeasurementOrReason, HeightMap | None]:
             reconstructor = present or Reconstructor(read_calibration(path))
             try:
-                refuse_source(image, reconstructor.calibration.provenance.sources.values())
                 return reconstructor, *measure_press(image, truth, reconstructor)
             except Exception as error:  # what is wrong with a press is its result
                 if as_input_error(error) is None:

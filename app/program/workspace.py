@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
@@ -40,7 +40,7 @@ from .calibration_entries import (
     read_entry,
     refuse_unlisted,
 )
-from .session_entries import DESCRIPTION, SessionEntry, read_session_entry
+from .session_entries import DESCRIPTION, SessionEntry, is_session, read_session_entry
 
 
 def unused_path(path: Path) -> Path:
@@ -99,6 +99,8 @@ class Workspace:
         self.folder = folder
         self._in_use: tuple[Path, Path | None] | None = None
         self._records: Store | None = None
+        self.to_validate: Path | None = None
+        """The calibration that the Validation step shows when its session is opened next."""
 
     @property
     def records(self) -> Store:
@@ -217,8 +219,13 @@ class Workspace:
         entries = (e for e in self.entries() if e.summary and e.summary.identity == identity)
         return next(entries, None)
 
-    def sessions(self) -> tuple[SessionEntry, ...]:
+    def sessions(self, elsewhere: Iterable[Path] = ()) -> tuple[SessionEntry, ...]:
         """Return every session, by sensor, the last changed first.
+
+        Parameters
+        ----------
+        elsewhere : iterable of Path, optional
+            Folders outside the workspace. Those that are no sessions are left out.
 
         Raises
         ------
@@ -227,7 +234,8 @@ class Workspace:
         """
         with self._reading():
             descriptions = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
-            entries = [read_session_entry(path.parent) for path in descriptions]
+            folders = {path.parent for path in descriptions} | set(filter(is_session, elsewhere))
+            entries = [read_session_entry(folder) for folder in folders]
         return tuple(sorted(entries, key=lambda e: (e.serial, -e.changed.timestamp())))
 
     @property

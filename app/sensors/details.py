@@ -43,7 +43,7 @@ def session_cells(entry: SessionEntry) -> tuple[TableCell, ...]:
         TableCell(entry.serial),
         TableCell(entry.folder.name, tip=str(entry.folder)),
         TableCell(str(entry.images), key=entry.images),
-        TableCell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
+        _time_cell(entry.changed),
     )
 
 
@@ -68,11 +68,11 @@ def cells_of(entry: CalibrationEntry, now: datetime, oldest_days: float) -> tupl
 
 def made_cell(entry: CalibrationEntry) -> TableCell:
     """Return the local time at which a calibration was made."""
-    created = entry.created
-    if created is None:
-        return TableCell("unknown", key=0.0)
-    local = created.astimezone()
-    return TableCell(f"{local:%Y-%m-%d %H:%M}", key=created.timestamp())
+    return TableCell("unknown", key=0.0) if entry.created is None else _time_cell(entry.created)
+
+
+def _time_cell(time: datetime) -> TableCell:
+    return TableCell(f"{time.astimezone():%Y-%m-%d %H:%M}", key=time.timestamp())
 
 
 def age_cell(age_days: float | None, oldest_days: float) -> TableCell:
@@ -192,12 +192,11 @@ def recordings_box(on_play: Callable[[Path], object]) -> TitledTable[Path]:
 def recording_cells(path: Path) -> tuple[TableCell, ...]:
     """Return the cells of a recording's row."""
     stat = path.stat()
-    changed = datetime.fromtimestamp(stat.st_mtime).astimezone()
     return (
         TableCell(path.parent.parent.name),
         TableCell(path.stem, tip=str(path)),
         TableCell(f"{1e-6 * stat.st_size:.0f} MB", key=stat.st_size),
-        TableCell(f"{changed:%Y-%m-%d %H:%M}", key=stat.st_mtime),
+        _time_cell(datetime.fromtimestamp(stat.st_mtime).astimezone()),
     )
 
 
@@ -207,7 +206,7 @@ class CalibrationDetails(QWidget):
     Parameters
     ----------
     actions : tuple of QAction
-        Actions on the calibration, the main one first.
+        Actions on the calibration, the main one first. Three are in the first row.
     """
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:
@@ -222,10 +221,8 @@ class CalibrationDetails(QWidget):
         # Space for the longest text, that of a validated calibration, so that the buttons do not
         # move.
         self._facts.setMinimumHeight(6 * self._facts.fontMetrics().lineSpacing())
-        first, *others = actions
-        buttons = hbox(action_button(first, primary=True), spacing=8)
-        for action in others:
-            buttons.addWidget(action_button(action))
+        buttons = [action_button(action, primary=action is actions[0]) for action in actions]
+        rows = hbox(*buttons[:3], spacing=8), hbox(*buttons[3:], spacing=8)
         self._area = scroll_area(QWidget())
         set_names(self._area, "sensors.details.stages", "Quality of the stages")
         self.busy = busy_bar("sensors.busy", "Writing the report")
@@ -233,7 +230,7 @@ class CalibrationDetails(QWidget):
         self._message.linkActivated.connect(
             lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
         )
-        parts = self._title, self._facts, buttons, self._message, self.busy
+        parts = self._title, self._facts, *rows, self._message, self.busy
         self.chart = TimeChart("sensors.over_time", "Errors of this sensor over time")
         self.chart.setToolTip("All calibrations and validations of the sensor. Dashed: tolerances")
         tabs = set_names(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
@@ -282,11 +279,8 @@ def _stages(entry: CalibrationEntry) -> QWidget:
 
 def _heading(title: str, verdict: Verdict) -> QWidget:
     heading = QWidget()
-    sign, text = (
-        StatusIcon(icon(verdict.value, verdict.value)),
-        MarkupLabel(f"<b>{escaped(title)}</b>"),
-    )
-    parts = sign, text, PlainLabel(verdict.word), None
+    sign = StatusIcon(icon(verdict.value, verdict.value))
+    parts = sign, MarkupLabel(f"<b>{escaped(title)}</b>"), PlainLabel(verdict.word), None
     hbox(*parts, of=heading, margins=(0, 10, 0, 0))
     return heading
 
@@ -303,7 +297,7 @@ def facts(entry: CalibrationEntry, summary: CalibrationSummary, uses: str) -> st
     width, height = summary.image_size
     operator = f"by {summary.operator}" if summary.operator else ""
     trial = entry.validation
-    none = ["Not validated: press an object of known size to validate it"]
+    none = ["Not validated: choose Validate, and press an object of known size"]
     lines = [
         f"Sensor {summary.serial}, model {summary.model}, images of {width} x {height} px",
         f"Made {made_cell(entry).text} {operator} from session {summary.session}, "

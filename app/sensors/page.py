@@ -17,6 +17,7 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_save, ask_several
 from app.program.jobs import BackgroundJob, JobQueue
 from app.program.preferences import WarningLimits
+from app.program.workspace import copy_file
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds, ask
@@ -96,9 +97,17 @@ TIPS = {
     "import": "Copy calibration files into the library",
     "demo": "Use all functions without a camera",
     "use": "Use this calibration for measuring",
+    "validate": "Compare measured sizes of known objects with their true sizes",
     "report": "Write a report of this calibration as PDF",
+    "copy": "Save this calibration, with its validation, for another computer",
     "remove": "Move this calibration to the trash of the system",
 }
+PATTERNS = f"Calibrations (*{ENDING})"
+MEASURE_FIRST = (
+    "Its session is not here, and no saved measurement counts. On the Measure page, open images of "
+    "new presses, state the true sizes, and save each measurement. Then choose Validate again."
+)
+"""Validation without session and measurements. That of a live image keeps no image to compare."""
 
 
 class SensorsPage(QWidget):
@@ -110,13 +119,9 @@ class SensorsPage(QWidget):
         self._entries: tuple[CalibrationEntry, ...] = ()
         set_names(self, "sensors", "Sensors")
         self.offered = self._make_actions()
-        *first, use, report, reveal, remove = self.offered.values()
+        actions = tuple(self.offered.values())
         self._table = CellsTable(
-            "sensors.table",
-            "Calibrations",
-            TITLES,
-            self._cells,
-            lambda entry: entry.path,
+            "sensors.table", "Calibrations", TITLES, self._cells, lambda entry: entry.path
         )
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
@@ -124,7 +129,7 @@ class SensorsPage(QWidget):
         self._sessions = sessions_box(lambda folder: context.requests.session.emit(str(folder)))
         self._recordings = recordings_box(self._play)
         self._reports = JobQueue("report", self)
-        self._details = CalibrationDetails((use, report, reveal, remove))
+        self._details = CalibrationDetails(actions[4:])
         self._reports.refused.connect(self._details.show_message)
         self._reports.progressed.connect(lambda *_: self._show_chosen())
         lists = splitter(
@@ -141,10 +146,7 @@ class SensorsPage(QWidget):
         self._stack = QStackedWidget()
         self._stack.addWidget(empty)
         self._stack.addWidget(split)
-        bar = hbox(spacing=8)
-        for action in first:
-            bar.addWidget(action_button(action))
-        bar.addStretch(1)
+        bar = hbox(*map(action_button, actions[:4]), None, spacing=8)
         vbox(bar, (self._stack, 1), of=self, margins=(16, 12, 16, 12), spacing=8)
         context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
@@ -158,7 +160,9 @@ class SensorsPage(QWidget):
             ("import", "import", "&Import calibration", self.choose_calibrations),
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
             ("use", "use", "&Use", partial(for_chosen, self._use)),
+            ("validate", "validated", "&Validate…", partial(for_chosen, self._validate)),
             ("report", "report", "Re&port…", self.choose_report),
+            ("copy", "copy", "Save a &copy…", partial(for_chosen, self._save_copy)),
             ("reveal", "folder", "Show in fol&der", partial(for_chosen, _open_folder)),
             ("remove", "remove", "&Remove", partial(for_chosen, self._ask_to_remove)),
         ):
@@ -195,8 +199,7 @@ class SensorsPage(QWidget):
     def choose_calibrations(self) -> None:
         """Let the user choose files to import."""
         settings, title = self._context.settings, "Import calibrations"
-        patterns = f"Calibrations (*{ENDING})"
-        self._import(ask_several(self, settings, "calibration", title, patterns))
+        self._import(ask_several(self, settings, "calibration", title, PATTERNS))
 
     def choose_report(self) -> None:
         """Ask for a file, and write the report of the selected calibration to it."""
@@ -240,9 +243,10 @@ class SensorsPage(QWidget):
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
         workspace, read_list = self._context.workspace, self._context.toasts.read_list
-        entries, sessions = read_list(workspace.entries), read_list(workspace.sessions)
-        recordings = read_list(workspace.recordings)
-        self._entries = entries
+        entries, recordings = read_list(workspace.entries), read_list(workspace.recordings)
+        recent = self._context.settings.recent("sessions")
+        sessions = read_list(partial(workspace.sessions, recent))
+        self._entries, self._all_sessions = entries, sessions
         self._table.show_items(entries)
         self._sessions.set_entries(sessions)
         self._recordings.set_entries(recordings)
@@ -262,8 +266,9 @@ class SensorsPage(QWidget):
         self._details.chart.show_series(checks)
         good = entry is not None and not entry.broken
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
+        self.offered["validate"].setEnabled(good)
         self.offered["report"].setEnabled(good and not self._reports.busy)
-        for name in ("reveal", "remove"):
+        for name in ("copy", "reveal", "remove"):
             self.offered[name].setEnabled(entry is not None)
 
     def _play(self, recording: Path) -> None:
@@ -281,6 +286,44 @@ class SensorsPage(QWidget):
 
     def _use(self, entry: CalibrationEntry) -> None:
         put_into_use(entry.path, self, context=self._context)
+
+    def _validate(self, entry: CalibrationEntry) -> None:
+        """Open the Validation step of its session or, without that, offer saved measurements."""
+        context, summary = self._context, entry.summary
+        assert summary is not None, "the action is only for those that can be read"
+        of_it = entry.serial, summary.session
+        if folders := [s.folder for s in self._all_sessions if (s.serial, s.folder.name) == of_it]:
+            context.workspace.to_validate = entry.path
+            context.requests.session.emit(str(folders[0]))
+            return
+        from gelpolight_core.lab.validation_trial import recorded_validation  # slow import
+
+        measure = "&Measure", partial(self._measure, entry)
+        with context.toasts.errors():
+            limits = context.settings.limits.percent
+            if (trial := recorded_validation(context.workspace.records, summary, limits)) is None:
+                ask(self, "Validate", MEASURE_FIRST, measure)
+            else:
+                record = "&Record this validation", partial(self._record, trial, entry.path)
+                ask(self, "Validate", "\n".join(trial.lines()), record, measure)
+
+    def _record(self, trial: Validation, path: Path) -> None:
+        from gelpolight_core.calibration.annotations import write_validation  # slow import
+
+        with self._context.toasts.errors():
+            write_validation(trial, path)
+        self._context.requests.calibrations_changed.emit()
+
+    def _measure(self, entry: CalibrationEntry) -> None:
+        self._use(entry)
+        self._context.requests.page.emit("measure")
+
+    def _save_copy(self, entry: CalibrationEntry) -> None:
+        settings, name = self._context.settings, entry.path.name
+        path = ask_save(self, settings, "calibration", "Save a copy", name, PATTERNS)
+        if path is not None:
+            with self._context.toasts.errors():
+                copy_file(entry.path, path)
 
     def _ask_to_remove(self, entry: CalibrationEntry) -> None:
         text = f"Move {entry.path.name} to the trash of the system?"

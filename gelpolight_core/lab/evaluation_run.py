@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.reference_object import ReferenceObject
 from gelpolight_core.session.session_images import read_colours
 
@@ -48,6 +49,25 @@ def press_measurement(
     return lambda path, truth: measure_press(path, truth, reconstructor)[0]
 
 
+def refuse_source(image: Path, sources: Collection[str]) -> None:
+    """Refuse an image that a calibration was made from: it cannot validate that calibration.
+
+    Parameters
+    ----------
+    image : Path
+        Image of a press.
+    sources : collection of str
+        SHA-256 of each file that the calibration was made from.
+
+    Raises
+    ------
+    InputError
+        If it is one of them, or cannot be read.
+    """
+    if file_hash(image) in sources:
+        raise InputError("This press was used for the calibration", image, Remedy.CAPTURE_AGAIN)
+
+
 def measure_press(
     path: Path, truth: ReferenceObject, reconstructor: Reconstructor
 ) -> tuple[Measurement, HeightMap]:
@@ -65,9 +85,11 @@ def measure_press(
     Raises
     ------
     InputError
-        If the image cannot be reconstructed, or no object is found in it.
+        If the calibration was made from the image, the image cannot be reconstructed, or no object
+        is found in it.
     """
     image = read_colours(path, response=reconstructor.calibration.response)
+    refuse_source(path, reconstructor.calibration.provenance.sources.values())
     heightmap = measurable_depth(reconstructor, image, where=str(path))
     edge_mm, edge_sd_mm = truth.edge_mm
     measurement = measure_heightmap(

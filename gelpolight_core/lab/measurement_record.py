@@ -13,6 +13,8 @@ from gelpolight_core.base.store import Entry
 STORED = {Verdict.PASS: "pass", Verdict.WARN: "undecided", Verdict.FAIL: "fail"}
 """What is stored for the verdict of a comparison."""
 DOUBTFUL = "doubtful"
+FILE = "file"
+"""Setting with the path of the image, empty if it was not a file."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from gelpolight_core.base.compared_quantity import Quantity
-from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Verdict
+from gelpolight_core.base.store import Store
 from gelpolight_core.base.user_name import user_name
+from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.reference_object import SHAPES, ReferenceObject
 from gelpolight_core.session.validation import Validation, worst_decision
 
+from .measurement_record import DOUBTFUL, FILE, MeasurementRecord
 from .reference_press import ReferencePress
 
 
@@ -45,13 +47,53 @@ def validate(
     limits_percent : (float, float)
         Tolerances of size and height.
     """
-    return Validation(
-        identity,
-        datetime.now(UTC).isoformat(timespec="seconds"),
-        user_name(),
-        "; ".join(dict.fromkeys(object_name(press.truth) for press in presses)),
-        tuple(q for press in presses for q in compared_lengths(press, limits_percent)),
-    )
+    objects = dict.fromkeys(object_name(press.truth) for press in presses)
+    comparisons = (q for press in presses for q in compared_lengths(press, limits_percent))
+    return _validation(identity, objects, comparisons)
+
+
+def recorded_validation(
+    store: Store, calibration: CalibrationSummary, limits_percent: tuple[float, float]
+) -> Validation | None:
+    """Return the validation of a calibration from its saved measurements, or None if none counts.
+
+    A measurement counts if it is of an object of stated size, is not doubtful, and its image is
+    a file that the calibration was not made from. Whether it conforms makes no difference.
+
+    Parameters
+    ----------
+    store : Store
+        The lab's records.
+    calibration : CalibrationSummary
+        The calibration.
+    limits_percent : (float, float)
+        Tolerances of size and height.
+
+    Raises
+    ------
+    InputError
+        If the records or an image cannot be read.
+    """
+    objects, comparisons = dict[str, None](), list[Quantity]()
+    for record in store.all(MeasurementRecord, calibration_id=calibration.identity):
+        file = Path(record.settings.get(FILE, ""))
+        compared = [q for q in record.quantities if q.truth is not None]
+        is_trusted = record.shape in SHAPES and record.verdict != DOUBTFUL and file.is_file()
+        if compared and is_trusted and file_hash(file) not in calibration.sources:
+            sizes = ", ".join(f"{q.label} {q.truth:g} mm" for q in compared)
+            objects[f"{SHAPES[record.shape]}, {sizes}"] = None
+            for q in compared:
+                limit = limits_percent[q.label == "height"]
+                comparisons.append(replace(q, name=q.label, limit_percent=limit))
+    return _validation(calibration.identity, objects, comparisons) if comparisons else None
+
+
+def _validation(
+    identity: str, objects: Iterable[str], comparisons: Iterable[Quantity]
+) -> Validation:
+    """Return a validation that is made now."""
+    now, names = datetime.now(UTC).isoformat(timespec="seconds"), "; ".join(objects)
+    return Validation(identity, now, user_name(), names, tuple(comparisons))
 
 
 def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> bool:
@@ -70,25 +112,6 @@ def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> 
     )
     failed = bool(validation.comparisons) and validation.verdict is Verdict.FAIL
     return trusted or failed
-
-
-def refuse_source(image: Path, sources: Collection[str]) -> None:
-    """Refuse an image that a calibration was made from: it cannot validate that calibration.
-
-    Parameters
-    ----------
-    image : Path
-        Image of a press.
-    sources : collection of str
-        SHA-256 of each file that the calibration was made from.
-
-    Raises
-    ------
-    InputError
-        If it is one of them, or cannot be read.
-    """
-    if file_hash(image) in sources:
-        raise InputError("This press was used for the calibration", image, Remedy.CAPTURE_AGAIN)
 
 
 def press_lines(press: ReferencePress, limits_percent: tuple[float, float]) -> tuple[str, str]:

@@ -1,13 +1,18 @@
 """A validation is of other images than its calibration, and says what would decide it."""
 
 import hashlib
+from dataclasses import replace
 
 import pytest
 
 from gelpolight_core.base.compared_quantity import REFERENCE, REST, Quantity
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.finding import Verdict
-from gelpolight_core.lab.validation_trial import refuse_source
+from gelpolight_core.calibration.manifest import CalibrationSummary
+from gelpolight_core.lab.evaluation_run import refuse_source
+from gelpolight_core.lab.measurement_record import FILE, MeasurementRecord
+from gelpolight_core.lab.measurement_store import open_records
+from gelpolight_core.lab.validation_trial import recorded_validation
 from gelpolight_core.session.validation import BALLS, SMALLER, Validation
 
 
@@ -18,6 +23,39 @@ def test_an_image_of_the_calibration_is_refused_by_its_content(tmp_path):
     refuse_source(image, {"0" * 64})
     with pytest.raises(InputError, match="used for the calibration"):
         refuse_source(image, {hashlib.sha256(b"a press").hexdigest()})
+
+
+def test_only_trusted_measurements_of_other_images_count_whether_they_conform_or_not(tmp_path):
+    image, own = tmp_path / "press.png", tmp_path / "own.png"
+    for file in (image, own):
+        file.write_bytes(file.name.encode())
+    sources = frozenset({hashlib.sha256(b"own.png").hexdigest()})
+    calibration = CalibrationSummary("c1", "A", "full", *[""] * 5, (4, 3), {}, sources=sources)
+    store = open_records(tmp_path / "records.sqlite")
+    stated = Quantity("diameter_mm", 5.01, 0.01, 5.0, 1.0)
+    far, unstated = replace(stated, value=6.0), replace(stated, truth=None)
+    cases = (
+        ("ball", unstated, "", image, "c1"),
+        ("ball", stated, "doubtful", image, "c1"),
+        ("ball", stated, "pass", own, "c1"),
+        ("ball", stated, "pass", "", "c1"),  # a live image: it may be one of the calibration
+        ("ball", stated, "pass", tmp_path / "gone.png", "c1"),
+        ("distance", stated, "pass", image, "c1"),
+        ("ball", stated, "pass", image, "another"),
+    )
+    for shape, quantity, verdict, file, identity in cases:
+        settings = {FILE: str(file)} if file else {}
+        store.add(MeasurementRecord("A", identity, shape, (quantity,), verdict, settings=settings))
+    assert recorded_validation(store, calibration, (5.0, 8.0)) is None
+    for quantity in (stated, far):
+        store.add(
+            MeasurementRecord("A", "c1", "ball", (quantity,), "pass", settings={FILE: str(image)})
+        )
+    validation = recorded_validation(store, calibration, (5.0, 8.0))
+    assert [c.value for c in validation.comparisons] == [5.01, 6.0]
+    assert {(c.name, c.limit_percent) for c in validation.comparisons} == {("diameter", 5.0)}
+    assert validation.verdict is Verdict.FAIL and validation.identity == "c1"
+    store.close()
 
 
 @pytest.mark.function("Read what would decide a validation that is not decidable")

@@ -142,6 +142,26 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     technician.rest()
 
 
+def test_a_session_opened_to_validate_a_calibration_shows_that_one_in_its_step(
+    technician, computed_project, tmp_path
+):
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    older = Path(shutil.copy(path, path.with_name("older.gplcal")))
+    identity = read_summary(path).identity
+    failed = Quantity("height", 2.0, truth=1.0, limit_percent=8.0)
+    for one in (path, older):
+        write_validation(Validation(identity, "2026-03-01T12:00:00+00:00", "", "x", (failed,)), one)
+    workspace, folder = technician.page.context.workspace, technician.session
+    for to_validate, step in ((older, "validation"), (None, "result"), (path, "validation")):
+        workspace.to_validate = to_validate
+        technician.page.open_path(folder)
+        technician.until(lambda key=step: technician.wizard.open.key == key)
+        assert to_validate in (None, technician.wizard.model.saved_path)
+        assert workspace.to_validate is None
+        technician.wizard.model.jobs.cancel()
+        technician.rest()
+
+
 @pytest.mark.parametrize("inside", [True, False])
 def test_an_image_of_the_calibration_is_no_press_of_its_validation(
     technician, computed_project, tmp_path, inside

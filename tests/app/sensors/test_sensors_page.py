@@ -29,7 +29,7 @@ from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.calibration.annotations import write_validation
 from gelpolight_core.calibration.calibration_file import read_calibration, write_calibration
-from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_record import FILE, MeasurementRecord
 from gelpolight_core.lab.measurement_store import NAME
 from gelpolight_core.output.recording.recording_format import RecordingHeader
 from gelpolight_core.output.recording.recording_writer import RecordingWriter
@@ -260,6 +260,59 @@ def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibrat
         page.findChild(QPushButton, "sensors.play.button").click()
     assert asked.args == ["inspect"]
     assert context.source.info is not None and context.source.info.kind == "recording"
+
+
+@pytest.mark.function("Go from a calibration to the Validation step of its session")
+def test_validate_opens_the_session_of_the_calibration_also_outside_the_library(
+    page, source, context, tmp_path, qtbot
+):
+    page.open_path(source)
+    chosen = page.chosen()
+    folder = tmp_path / "elsewhere" / chosen.summary.session
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text(f'[sensor]\nserial = "{chosen.serial}"\n')
+    for recent in (folder, tmp_path / "gone"):
+        context.settings.add_recent("sessions", recent)
+    page.refresh()
+    table = page.findChild(QTableView, "sensors.sessions.table")
+    assert table.model().index(0, 1).data() == folder.name and table.model().rowCount() == 1
+    with qtbot.waitSignal(context.requests.session) as asked:
+        page.offered["validate"].trigger()
+    assert asked.args == [str(folder)]
+    assert context.workspace.to_validate == chosen.path
+
+
+@pytest.mark.function("Validate a calibration without its session, with saved measurements")
+def test_saved_measurements_validate_a_calibration_without_its_session(
+    page, source, context, tmp_path, qtbot
+):
+    page.open_path(source)
+    path = page.chosen().path
+    page.offered["validate"].trigger()
+    with qtbot.waitSignal(context.requests.page) as asked:
+        answer(page, "answer0")
+    assert asked.args == ["measure"] and context.workspace.in_use == path
+    image = tmp_path / "press.png"
+    image.write_bytes(b"a press")
+    context.workspace.records.add(
+        MeasurementRecord(
+            page.chosen().serial, page.chosen().summary.identity, "ball",
+            (Quantity("diameter_mm", 5.01, 0.01, 5.0, 5.0),), "pass",
+            settings={FILE: str(image)},
+        )
+    )  # fmt: skip
+    page.offered["validate"].trigger()
+    answer(page, "answer0")
+    assert read_entry(path).validated and page.chosen().validated
+
+
+@pytest.mark.function("Save a copy of a calibration file")
+def test_a_copy_of_a_calibration_is_saved(page, source, tmp_path, monkeypatch):
+    copy = tmp_path / "copy.gplcal"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(copy), ""))
+    page.open_path(source)
+    page.offered["copy"].trigger()
+    assert copy.read_bytes() == page.chosen().path.read_bytes()
 
 
 @pytest.mark.function("Write a calibration's report, as PDF")
