@@ -36,13 +36,7 @@ from .processing_panel import ProcessingSummary
 from .record_control import RecordControl
 
 LIVE = "Press an object into the membrane. Press Space to freeze it at full detail."
-IDLE = {
-    "folder": "Comma and full stop show the previous and the next image. "
-    "Press Space to see this one at full detail.",
-    "recording": "Comma and full stop step through the recording. "
-    "Press Space to freeze an image at full detail.",
-}
-"""What the banner says without advice, by the kind of the source if it is not live."""
+STORED = "Press comma or full stop for another image. Press Space to freeze it at full detail."
 FROZEN = "The image is frozen. Press Space to continue."
 
 
@@ -263,9 +257,8 @@ class InspectPage(QWidget):
     def _advise(self) -> None:
         """Show what to do next."""
         state = self.live_depth.state
-        self.banner.advise(
-            advise(state), idle=FROZEN if self.live.paused else IDLE.get(state.kind, LIVE)
-        )
+        idle = STORED if state.kind in ("folder", "recording") else LIVE
+        self.banner.advise(advise(state), idle=FROZEN if self.live.paused else idle)
 
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""

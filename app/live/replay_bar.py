@@ -48,9 +48,7 @@ class ReplayBar(QWidget):
                 action.setCheckable(True)
                 self._play = action
         self._slider = set_names(
-            Slider(Qt.Orientation.Horizontal),
-            f"{page}.replay.seek",
-            "Position",
+            Slider(Qt.Orientation.Horizontal), f"{page}.replay.seek", "Position"
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
@@ -69,7 +67,6 @@ class ReplayBar(QWidget):
     def follow(self, source: object) -> None:
         """Follow a source. The bar is hidden unless its images are stored."""
         self._source = source if isinstance(source, Player) else None
-        self._resumes = False
         self.setVisible(self._source is not None)
         if self._source is None:
             self._timer.stop()
@@ -112,15 +109,13 @@ class ReplayBar(QWidget):
                 self._moved()
 
     def step(self, count: int) -> bool:
-        """Move forward by a number of images. Return whether there is such an image."""
-        if self._source is None:
-            return False
-        before = self._source.playback().position
-        self._resumes = False
-        self._source.step(count)
-        self._poll()
-        self._moved()
-        return self._source.playback().position != before
+        """Move forward by a number of images. Return whether the images are stored."""
+        if self._source is not None:
+            self._resumes = False
+            self._source.step(count)
+            self._poll()
+            self._moved()
+        return self._source is not None
 
     def _seek(self, index: int) -> None:
         if self._source is not None:

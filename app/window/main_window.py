@@ -16,6 +16,7 @@ from PySide6.QtGui import (
     QDragEnterEvent,
     QDropEvent,
     QGuiApplication,
+    QMoveEvent,
 )
 from PySide6.QtWidgets import (
     QApplication,
@@ -23,6 +24,7 @@ from PySide6.QtWidgets import (
     QMenu,
     QSizePolicy,
     QStackedWidget,
+    QStyle,
     QToolBar,
     QWidget,
 )
@@ -88,7 +90,9 @@ class MainWindow(QMainWindow):
         super().__init__()
         set_names(self, "main", "GelPoLight Studio")
         self.setWindowTitle("GelPoLight Studio")
-        self.setMinimumSize(SMALLEST.boundedTo(QGuiApplication.primaryScreen().availableSize()))
+        # Until the window system has drawn the frame, it is assumed to be that of the style.
+        title_bar = self.style().pixelMetric(QStyle.PixelMetric.PM_TitleBarHeight)
+        self._fit_screen(QSize(0, title_bar))
         self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or PAGES}
@@ -421,14 +425,22 @@ class MainWindow(QMainWindow):
         self._ends_work = True
         self.close()
 
+    def _fit_screen(self, frame: QSize) -> None:
+        """Let the window shrink until it fits the screen with its frame."""
+        self.setMinimumSize(SMALLEST.boundedTo(self.screen().availableSize() - frame))
+
+    def moveEvent(self, event: QMoveEvent) -> None:
+        """Follow the frame, which comes with the first move, and the screen."""
+        super().moveEvent(event)
+        self._fit_screen(self.frameSize() - self.size())
+
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask all pages, then leave the visible one and save the window layout."""
         # All are asked before the first one ends its work.
-        texts = [_call(page, "unfinished", default="") for page in self._made.values()]
-        if any(texts) and not self._ends_work:
+        work = " ".join(_call(page, "unfinished", default="") for page in self._made.values())
+        if work.strip() and not self._ends_work:
             event.ignore()
-            text, close = " ".join(filter(None, texts)), ("Close", self._close_anyway)
-            ask(self, "Close the program?", text, close)
+            ask(self, "Close the program?", work.strip(), ("Close", self._close_anyway))
             return
         if not all(_call(page, "can_close", default=True) for page in self._made.values()):
             event.ignore()

@@ -52,12 +52,8 @@ def slope_scale() -> ColourScale:
 def uncertainty_scale(sd_um: Float32Array) -> ColourScale:
     """Return the scale of standard deviations in µm. One pixel in a hundred is above it."""
     top = float(np.percentile(sd_um, 99.0)) if sd_um.size else LEAST_SD_UM
-    return ColourScale(
-        f"1 sd [{UNITS['um']}]",
-        colour_table("inferno"),
-        0.0,
-        round_up(max(round(top, 4), LEAST_SD_UM)),
-    )
+    top = round_up(max(round(top, 4), LEAST_SD_UM))
+    return ColourScale(f"1 sd [{UNITS['um']}]", colour_table("inferno"), 0.0, top)
 
 
 def flag_scale() -> ColourScale:

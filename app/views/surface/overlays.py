@@ -194,7 +194,7 @@ def axes_marks(
         start, end, outward = np.array(first), np.array(last), np.array(out)
         ends += [start, end]
         # Beside the numbers, but above the depth axis, which may be short.
-        above = end + (0.0, 0.0, 4.0 * tick)
+        above = end + np.array([0.0, 0.0, 4.0 * tick])
         points.append(above if number == 2 else 0.5 * (start + end) + 6.0 * outward)
         texts.append(title)
         for place, value in zip(places, values, strict=True):
