@@ -186,6 +186,10 @@ class MeasurePage(QWidget):
         self.press_view.refresh()
         self.results.refresh()
 
+    def unfinished(self) -> str:
+        """Return what would be lost if the window was closed. Empty: nothing."""
+        return self.press_view.unfinished()
+
     def can_close(self) -> bool:
         """Return True: all saved data is on disk."""
         self.press_view.close_work()

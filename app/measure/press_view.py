@@ -21,6 +21,7 @@ from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
 from app.source_ui.bench_panel import BenchArea
+from app.sources.source_list import next_image
 from app.views.map.colour_tables import colour_table
 from app.widgets.actions import Slot, action_button, icon_button, make_action, undo_actions
 from app.widgets.inputs import refusal
@@ -234,8 +235,16 @@ class PressView(QWidget):
     # Live and frozen
 
     def toggle_freeze(self) -> None:
-        """Freeze the image, or continue."""
-        (self.freeze if self.work.image is None else self.release)()
+        """Freeze the image, or go to the next object: the next file of a folder, or live."""
+        image = self.work.image
+        if image is None:
+            self.freeze()
+            return
+        following = None if image.path is None else next_image(image.path)
+        if following is not None:
+            self.try_file(following)
+        elif image.path is not None or not self.replay.step(1):
+            self.release()
 
     def freeze(self, *, propose: bool = False) -> None:
         """Freeze the newest live image to measure on it, and detect the object if requested."""
@@ -244,7 +253,8 @@ class PressView(QWidget):
         now = datetime.now().astimezone()
         info = self.context.source.info
         camera = "image" if info is None else info.name
-        name = f"{camera}, {now:%H:%M:%S}"
+        name = newest.frame.name or f"{camera}, {now:%H:%M:%S}"
+        self.replay.hold(newest.frame)
         image = MeasuredImage(name, frame=newest.frame, serial=self.live.serial)
         self._take(image, propose=propose)
 
@@ -253,6 +263,7 @@ class PressView(QWidget):
         if self.work.image is not None and self.work.image.path is not None:
             self.stage.surface.set_pins(())  # they were on another source's image
         self._steady.hold(None)
+        self.replay.hold(None)
         self.work.take(None)
         self._want()
         if self.live.stream is None or not self.map.map.has_image:
@@ -416,6 +427,12 @@ class PressView(QWidget):
             freezable=self._shown is not None,
             earlier=self.work.image is not None and self._steady.other,
         )
+
+    def unfinished(self) -> str:
+        """Return what would be lost if the window was closed. Empty: nothing."""
+        record = self._record()
+        unsaved = record is not None and not self._is_saved(record)
+        return "A measurement is not saved to the records." if unsaved else ""
 
     def refresh(self) -> None:
         """Show the present state, of an object with the edge that is stated."""

@@ -428,13 +428,30 @@ def test_a_steady_press_is_frozen_and_the_next_is_followed_or_reported_as_anothe
     assert [tool.name for tool in work.sheet.values()] == ["cylinder"]
     held = work.result.measurement.as_json()
     # It is the same image: from its file the figures are identical to the last bit.
-    press_view.open_file(press)
+    press_view.open_file(folders["cylinder"] / press.name)
     press_view.propose()
     _measured(page, qtbot)
     assert work.result.measurement.as_json() == held
     press_view.freeze_action.trigger()
     assert work.image is None
     assert not press_view.save_action.isEnabled()
+
+
+@pytest.mark.function("Measure the presses of a folder one after the other")
+@pytest.mark.usefixtures("library")
+def test_the_next_object_is_the_next_file_and_an_unsaved_one_is_asked_for(page, qtbot, press):
+    press_view, files = page.press_view, sorted(press.parent.glob("*.png"))
+    assert page.unfinished() == ""
+    _put_cylinder(page, press, qtbot)
+    assert "not saved" in page.unfinished()
+    press_view.save_action.trigger()
+    _kept(page, qtbot, 1)
+    assert page.unfinished() == ""
+    press_view.freeze_action.trigger()
+    assert press_view.work.image.path == files[files.index(press) + 1]
+    press_view.open_file(files[-1])
+    press_view.freeze_action.trigger()
+    assert press_view.work.image is None
 
 
 @pytest.mark.function("Measure a recording frame by frame")

@@ -49,7 +49,6 @@ def test_images_repeat_in_the_order_of_their_names(folder):
     source.close()
 
 
-@pytest.mark.function("Step through a folder of images file by file")
 def test_a_folder_stays_at_a_file_until_stepped_and_names_it(folder):
     source = FolderSource(folder)
     source.open()
