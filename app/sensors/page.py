@@ -160,9 +160,9 @@ class SensorsPage(QWidget):
             ("import", "import", "&Import calibration", self.choose_calibrations),
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
             ("use", "use", "&Use", partial(for_chosen, self._use)),
-            ("validate", "validated", "&Validate…", partial(for_chosen, self._validate)),
+            ("validate", "validated", "Va&lidate…", partial(for_chosen, self._validate)),
             ("report", "report", "Re&port…", self.choose_report),
-            ("copy", "copy", "Save a &copy…", partial(for_chosen, self._save_copy)),
+            ("copy", "copy", "S&ave a copy…", partial(for_chosen, self._save_copy)),
             ("reveal", "folder", "Show in fol&der", partial(for_chosen, _open_folder)),
             ("remove", "remove", "&Remove", partial(for_chosen, self._ask_to_remove)),
         ):

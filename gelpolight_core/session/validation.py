@@ -96,7 +96,7 @@ class Validation:
         enough = math.ceil(10.0 * (abs(compared.error_percent or 0.0) + percent)) / 10.0
         return (
             f"The uncertainty of the {compared.label} is ± {percent:.2g} % (k = {COVERAGE:g}), "
-            f"the tolerance {compared.limit_percent:g} %. Its largest part is "
+            f"the tolerance {compared.limit_percent:g} %. Its largest part is the "
             f"{SOURCES.get(part, part)}{action and f': {action}'}. "
             f"A tolerance of {enough:g} % can be decided."
         )
