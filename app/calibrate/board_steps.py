@@ -195,7 +195,8 @@ class LensStep(ImageStep):
 
     def detector(self, name: str) -> Detector:
         """Return the detection of the board, with the earlier views."""
-        names = {path.name for path in self.session.found(self.folder)} - {name}
+        # A captured view is judged by the stage, not as the next one.
+        names = set() if name else {path.name for path in self.session.found(self.folder)}
         boards = (view.board for n, view in self.views().items() if n in names)
         earlier = [board for board in boards if board is not None]
         board = self.session.checkerboard

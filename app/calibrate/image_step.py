@@ -205,11 +205,15 @@ class ImageStep(Step):
                 held_share, sentence = current.held, "Hold still: captures by itself."
             else:
                 sentence += " Move it for an automatic capture, or click Capture."
-        elif self.model.page.finished and detection.ready:
+        elif self.model.page.finished:
             sentence = "This step is complete."
-        rings = hold_ring(detection.overlay, self.area.view.image.image_size, held_share)
-        self.area.view.set_overlay(replace(detection.overlay, rings=rings))
-        self.model.show_live(sentence, ready=detection.good or self.model.page.finished)
+        overlay, finished = detection.overlay, self.model.page.finished
+        if finished and not detection.ready:
+            overlay = ImageOverlay()  # no other view is expected
+        rings = hold_ring(overlay, self.area.view.image.image_size, held_share)
+        self.area.view.set_overlay(replace(overlay, rings=rings))
+        waits = not detection.ready and not self.count()
+        self.model.show_live(sentence, ready=detection.good or finished, waits=waits)
 
     def detected(self, done: Done[SourceFrame, HeldDetection | None]) -> None:
         """Show what was detected in a live image, and capture a good one in automatic mode."""

@@ -6,7 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import QUrl, Signal
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QFormLayout, QFrame, QScrollArea, QWidget
+from PySide6.QtWidgets import QFormLayout, QFrame, QWidget
 
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
@@ -15,10 +15,11 @@ from app.widgets.actions import push_button
 from app.widgets.forms import Form
 from app.widgets.inputs import refusal
 from app.widgets.label import PlainLabel
-from app.widgets.layout import hbox, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.text_roles import heading, named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError
+from gelpolight_core.base.finding import Finding
 from gelpolight_core.session.session import Session, serial_fault
 from gelpolight_core.stages.leds.setup_checks import judge_set_up
 
@@ -36,7 +37,14 @@ from .setup_values import (
 from .step import Step
 
 
-class SetupForm(QScrollArea):
+def unusual_numbers(session: Session) -> tuple[Finding, ...]:
+    """Return what is unusual about the stated numbers; a closed sensor states no optics."""
+    if session.in_place is not None:
+        return ()
+    return judge_set_up(session.sensor, session.ball_default_radius_mm)
+
+
+class SetupForm(QWidget):
     """A form for the description of a session. What it asks follows from the session.
 
     Parameters
@@ -56,11 +64,12 @@ class SetupForm(QScrollArea):
         super().__init__()
         self._context = context
         set_names(self, "setup", "Set-up")
-        self.setWidgetResizable(True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        inside, holder = QWidget(), QWidget(maximumWidth=640, minimumWidth=320)
-        self.setWidget(inside)
+        # The foot is always visible, below the part that scrolls.
+        holder, foot = (QWidget(maximumWidth=640, minimumWidth=320) for _ in range(2))
+        inside = QWidget()
         hbox(None, (holder, 20), None, of=inside)
+        below = hbox(None, (foot, 20), None)
+        vbox((scroll_area(inside), 1), below, of=self, margins=0, spacing=0)
         self._title, self._task = heading("", size=1.35), PlainLabel(wrap=True)
         self.values = Form(SetupValues(), "setup")
         # Rows that wrap have no height of their own in a scroll area.
@@ -69,7 +78,10 @@ class SetupForm(QScrollArea):
         self.serial = self.values.inputs["serial"]
         self.facts = named_label("setup.facts", "About this kind of sensor")
         self._prints = QWidget()
-        boards = ("lens", "Print the board of the lens…"), ("top", "Print the other board…")
+        boards = (
+            ("lens", "Print the board of the lens…"),
+            ("top", "Print the board of the top surface…"),
+        )
         tip = (
             "Save this board as an A4 page to print at 100 % scale; measure the squares "
             "after printing"
@@ -86,8 +98,9 @@ class SetupForm(QScrollArea):
         set_property(self.accept, "primary", True)
         sensor = set_names(QFrame(), "card", "Sensor")
         vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
-        parts = self._title, self._task, self._build_camera(), sensor, self.problem, self.accept
-        vbox(*parts, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
+        cards = self._title, self._task, self._build_camera(), sensor
+        vbox(*cards, None, of=holder, margins=(0, 16, 0, 16), spacing=16)
+        vbox(self.problem, self.accept, of=foot, margins=(0, 0, 0, 8), spacing=8)
         self.show_session(new_session(), new=True)
         for changed in (context.source.changed, context.cameras.changed):
             changed.connect(self._show_camera)
@@ -161,8 +174,7 @@ class SetupForm(QScrollArea):
         self.facts.setVisible(is_preset or values.source == "stated")
         self._prints.setVisible(values.optics)
         try:
-            sensor = session_of(self.session, values).sensor
-            unusual = () if not values.optics else judge_set_up(sensor)
+            unusual = unusual_numbers(session_of(self.session, values))
         except InputError as error:
             unusual = ()
             problem = f"{error.found}. {error.advice}."
@@ -236,8 +248,7 @@ class SetupStep(Step):
     def state(self) -> StepState:
         """Return whether what is stated is usual: a session is created with all values."""
         state, text = super().state() if self.stages else ("pass", "Stated")
-        session = self.session
-        unusual = judge_set_up(session.sensor) if session.in_place is None else ()
+        unusual = unusual_numbers(self.session)
         return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
 
     def focus(self) -> QWidget:

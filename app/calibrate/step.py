@@ -113,6 +113,9 @@ class Step(QObject, StepDeclaration):
         if not statuses:
             return "empty", ""
         worst = max(statuses, key=lambda status: ORDER.index(status.state.value))
+        is_next = self.model.jobs.busy and self.model.page.step is self
+        if worst.state is StageState.STALE and is_next:  # with what was just captured
+            return RUNNING, "Computing"
         if worst.state is StageState.FAIL and 0 < self.count() < self.least:
             return BEGUN, f"{self.count()} of {self.wanted} captured"
         return worst.state.value, worst.sentence
@@ -151,7 +154,8 @@ class Step(QObject, StepDeclaration):
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Return the buttons that correct what is wrong, the best first."""
         upto = self.stages[-1] if self.stages else None
-        stale = state in (StageState.STALE.value, StageState.WAITING.value)
+        # Without images of its own, it can only wait for a computation.
+        stale = not self.folder or state in (StageState.STALE.value, StageState.WAITING.value)
         if stale and not self.model.jobs.busy and self.project.stale(upto=upto):
             return (("Recompute", lambda: self.model.compute(upto)),)
         return ()

@@ -27,7 +27,7 @@ from app.widgets.label import PlainLabel, escaped, plain_tip
 from app.widgets.layout import hbox, keep_space, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon
-from app.widgets.text_roles import named_label, set_background_role, set_text_role
+from app.widgets.text_roles import named_label, set_background_role, set_property, set_text_role
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import QualityTable
 
@@ -114,6 +114,7 @@ class StepHelp(QToolButton):
         self._sheet = set_names(
             QFrame(self, Qt.WindowType.Popup), "calibrate.help.sheet", "Help on this step"
         )
+        self._sheet.setFrameShape(QFrame.Shape.Box)
         self._sheet.setFixedWidth(SHEET_WIDTH)
         self._assembly = "complete"
         self._drawing = named_label("calibrate.assembly", "Help on this step", wrap=False)
@@ -269,7 +270,6 @@ class StepPanel(QWidget):
         row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
         vbox(self.lay, self.live, row, of=self.capturing, margins=0, spacing=8)
         self.next = set_names(QPushButton("&Next step"), "calibrate.next", "Next step")
-        self.next.setProperty("primary", True)
         for button in (self.capture, self.next):
             button.setFixedHeight(36)
         self.more.setFixedSize(56, 36)
@@ -346,7 +346,7 @@ class StepPanel(QWidget):
         self.notice.setVisible(bool(notice))
         self.sentence.setText(page.sentence)
         self.sentence.setVisible(bool(is_wrong) and not notice)
-        texts = [] if notice else [text for text, _ in page.remedies[: len(self.buttons)]]
+        texts = [text for text, _ in page.remedies[: len(self.buttons)]]
         for button, text in zip(self.buttons, (*texts, *[""] * REMEDIES), strict=False):
             button.setVisible(bool(text))
             button.setText(text)
@@ -366,6 +366,7 @@ class StepPanel(QWidget):
         self.progress.setRange(0, 100 if fraction > 0.0 else 0)
         self.progress.setValue(round(100 * fraction))
         self.next.setText(f"&Next: {page.following}")
+        set_property(self.next, "primary", page.finished)
 
     def reveal_message(self) -> None:
         """Scroll to what is wrong or comes next."""

@@ -27,7 +27,7 @@ from .closed_sensor_steps import InPlaceBallsStep, ScaleStep
 from .image_area import ImageArea
 from .image_step import plain_step
 from .light_steps import BackgroundStep, LightsStep, WhiteboardStep
-from .page_state import OPEN, PageState
+from .page_state import OPEN, PageState, is_done
 from .result_step import ResultStep
 from .setup_step import SetupStep
 from .step import Step, resolve_page
@@ -132,7 +132,7 @@ class Wizard(QWidget):
         panel.automatic.setChecked(self.context.settings.preferences.captures_automatically)
         prefer = self.context.settings.prefer
         panel.automatic.toggled.connect(lambda on: prefer(captures_automatically=on))
-        panel.cancel.clicked.connect(model.jobs.cancel)
+        panel.cancel.clicked.connect(model.stop)
         guide = self.context.requests.guide
         panel.help.guide.clicked.connect(lambda: guide.emit(*self.open.guide))
         area.reconnect.clicked.connect(self.live.open)
@@ -253,11 +253,15 @@ class Wizard(QWidget):
             if step.folder and states[step.key][0] in OPEN:
                 return step.key
         tried = states["validation"][0] != StageState.EMPTY.value
-        return "validation" if self.model.saved and not tried else "result"
+        ready = is_done(states["result"][0]) and self.model.saved and not tried
+        return "validation" if ready else "result"
 
     def _compute_what_never_was(self) -> None:
-        """Compute a step's first result automatically. An outdated one waits for Recompute."""
-        if stages := self.open.stages:
+        """Compute a step's first result automatically, unless the user has stopped it.
+
+        An outdated one waits for Recompute.
+        """
+        if (stages := self.open.stages) and not self.model.stopped:
             ready = self.project.stale(upto=stages[-1])
             statuses = self.project.statuses()
             if not any(statuses[stage].state is StageState.STALE for stage in ready):

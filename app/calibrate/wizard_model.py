@@ -50,6 +50,8 @@ class WizardModel(QObject):
         The newest saved calibration of this session.
     page : PageState
         State of the page.
+    stopped : bool
+        Whether the user has stopped the computations, so that none starts by itself.
 
     Signals
     -------
@@ -91,6 +93,7 @@ class WizardModel(QObject):
         self._saved_inputs = ""
         self.page = PageState()
         self.running: str | None = None
+        self.stopped = False
         self.statuses = project.statuses()
 
     @property
@@ -113,9 +116,19 @@ class WizardModel(QObject):
         """Show the result of the last action. An empty text: nothing to read."""
         self.update_page(notice=(sentence, role))
 
-    def show_live(self, sentence: str, *, ready: bool) -> None:
-        """Show the content of the live image. `ready`: it can be captured."""
-        self.update_page(live=(sentence, "pass" if ready else "warn"))
+    def show_live(self, sentence: str, *, ready: bool, waits: bool = False) -> None:
+        """Show the content of the live image.
+
+        Parameters
+        ----------
+        sentence : str
+            What it shows.
+        ready : bool
+            Whether it can be captured.
+        waits : bool, optional
+            Whether the step has no image yet, so that what is missing is no mistake.
+        """
+        self.update_page(live=(sentence, "pass" if ready else "muted" if waits else "warn"))
 
     @property
     def saved(self) -> str:
@@ -251,9 +264,15 @@ class WizardModel(QObject):
                 finally:
                     self.running = None
 
+        self.stopped = False
         if self.project.stale(upto=upto):
             self.jobs.submit(BackgroundJob("Computing", work, lambda _nothing: self.changed.emit()))
             self.changed.emit()
+
+    def stop(self) -> None:
+        """Stop the computations until the user asks for one."""
+        self.jobs.cancel()
+        self.stopped = True
 
     def close(self) -> None:
         """Write captured images, stop all work, and release the camera."""

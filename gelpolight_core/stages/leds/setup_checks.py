@@ -14,13 +14,15 @@ LEAST_INDEX, MOST_INDEX = 1.33, 1.66
 """Refractive indices of water, below all gels, and of the densest clear polymers."""
 
 
-def judge_set_up(sensor: SensorData) -> tuple[Finding, ...]:
+def judge_set_up(sensor: SensorData, ball_radius_mm: float | None = None) -> tuple[Finding, ...]:
     """Judge the stated numbers of a sensor by themselves.
 
     Parameters
     ----------
     sensor : SensorData
         As stated in the session.
+    ball_radius_mm : float, optional
+        Usual radius of the balls.
 
     Returns
     -------
@@ -30,6 +32,7 @@ def judge_set_up(sensor: SensorData) -> tuple[Finding, ...]:
     index = sensor.elastomer_refractive_index
     too_low = index < LEAST_INDEX
     outside_mm = sensor.led_height_mm - sensor.elastomer_thickness_mm
+    ball_mm = 2.0 * (ball_radius_mm or 0.0)
     return _poor(
         judge(
             "stated_index",
@@ -46,6 +49,14 @@ def judge_set_up(sensor: SensorData) -> tuple[Finding, ...]:
             "mm",
             warn=0.0,
             remedy="Check the LED height and the thickness of the elastomer",
+        ),
+        judge(
+            "ball_over_field",
+            "Usual ball diameter over the working diameter",
+            ball_mm / sensor.working_diameter_mm,
+            warn=1.0,
+            remedy="Check the ball diameter: a ball larger than the working area shows hardly any"
+            " slope in it",
         ),
     )
 

@@ -5,6 +5,7 @@ import pytest
 from technician import read_rgb
 
 from app.program.settings import AppSettings
+from gelpolight_core.calibration.project import CalibrationProject
 
 
 @pytest.fixture
@@ -26,15 +27,52 @@ def test_a_completed_step_stays_open_says_so_and_offers_the_next_one(
     wizard, panel = technician.wizard, technician.wizard.panel
     technician.until(lambda: panel.live.text())
     assert not wizard.model.page.finished
+    assert not panel.next.property("primary")
+    assert wizard.model.page.live[1] == "muted", "nothing is captured yet: that is no mistake"
     camera.show(image)
     technician.until(lambda: wizard.model.page.finished)
     technician.rest()
     assert len(project.session.found("background")) == 1
     assert wizard.open.key == "background", "a capture that comes now belongs to it"
     technician.until(lambda: "complete" in panel.live.text())
+    assert panel.next.property("primary")
+    camera.show(np.full_like(image, 3))
+    seen = []
+    wizard.model.live.processed.connect(lambda item: seen.append(item.result))
+    technician.until(lambda: seen and seen[-1] is not None and not seen[-1].detection.ready)
+    technician.until(lambda: "complete" in panel.live.text())
+    assert wizard.model.page.live[1] == "pass", "what is complete warns of nothing"
     assert panel.next.isVisible() and wizard.at("balls").title in panel.next.text()
     technician.click("calibrate.next")
     assert wizard.open.key == "balls", "they must be compared with the new background"
+    technician.rest()
+
+
+@pytest.mark.function("Stop a computation, and start it again")
+def test_after_stop_nothing_starts_by_itself_and_recompute_is_offered(technician, computed_project):
+    technician.page._show_wizard(CalibrationProject(computed_project().session.folder))
+    wizard = technician.wizard
+    assert wizard.open.key == "result" and wizard.model.jobs.busy
+    wizard.panel.cancel.click()
+    technician.rest()
+    assert technician.see("calibrate.notice").text()
+    assert technician.see("calibrate.remedy0").text() == "Recompute"
+    wizard.go_to("balls")
+    assert not wizard.model.jobs.busy
+    technician.click("calibrate.remedy0")
+    assert wizard.model.jobs.busy
+    wizard.panel.cancel.click()
+    technician.rest()
+
+
+def test_a_session_opens_at_its_result_until_that_is_computed(technician, computed_project):
+    project = computed_project()
+    technician.begin(project, "result")
+    technician.save()
+    assert technician.wizard.first_open_step() == "validation"
+    technician.page._show_wizard(CalibrationProject(project.session.folder))
+    assert technician.wizard.model.saved and technician.wizard.open.key == "result"
+    technician.wizard.panel.cancel.click()
     technician.rest()
 
 

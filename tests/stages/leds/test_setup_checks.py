@@ -24,7 +24,13 @@ from gelpolight_core.stages.leds.setup_checks import judge_set_up, judge_set_up_
 def test_unusual_numbers_are_named(small_calibration, changes, keys):
     sensor = replace(small_calibration.data.sensor, **changes)
 
-    assert [finding.key for finding in judge_set_up(sensor)] == keys
+    assert [finding.key for finding in judge_set_up(sensor, 4.0)] == keys
+
+
+def test_a_ball_larger_than_the_working_area_is_unusual(small_calibration):
+    (finding,) = judge_set_up(small_calibration.data.sensor, 317.5)
+
+    assert finding.key == "ball_over_field"
 
 
 def test_the_measured_pose_contradicts_wrong_numbers(small_calibration):
