@@ -125,7 +125,7 @@ class Toast(QWidget):
 
 
 class Toasts(QObject):
-    """The messages in the lower right corner of a window, above everything else."""
+    """The messages in the lower left corner, where no page has a main button."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -243,7 +243,7 @@ class Toasts(QObject):
         for toast in reversed(self.shown()):
             height = toast.height_for(width)
             bottom -= height
-            toast.setGeometry(area.right() + 1 - width, bottom, width, height)
+            toast.setGeometry(area.left(), bottom, width, height)
             bottom -= 8
         self._raise_all()
 

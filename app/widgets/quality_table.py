@@ -63,11 +63,14 @@ def _row(figure: Finding, *, narrow: bool) -> str:
     verdict, cell = figure.verdict, "<td width='1%' align='right' style='white-space: nowrap"
     colour = f"white-space: nowrap; color: @{verdict.value}"
     sign = verdict.sign if narrow else f"{verdict.sign} {verdict.word}"
+    if verdict is Verdict.PASS and not figure.limit_text:
+        sign = ""  # not judged
+    limit = f"<span style='color: @muted'>{escaped(figure.limit_text)}</span>"
+    between = "<br>" if narrow else f"</td>{cell}'>"  # a side panel has no room for another column
     row = (
         f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"
         f"<td width='97%'>{escaped(figure.text)}</td>"
-        f"{cell}'>{escaped(figure.value_text)}</td>"
-        f"{cell}; color: @muted'>{escaped(figure.limit_text)}</td></tr>"
+        f"{cell}'>{escaped(figure.value_text)}{between}{limit}</td></tr>"
     )
     advice = _advice(figure)
     return row + (f"<tr><td></td><td colspan='3'>{escaped(advice)}</td></tr>" if advice else "")

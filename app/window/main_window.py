@@ -91,8 +91,7 @@ class MainWindow(QMainWindow):
         set_names(self, "main", "GelPoLight Studio")
         self.setWindowTitle("GelPoLight Studio")
         # Until the window system has drawn the frame, it is assumed to be that of the style.
-        title_bar = self.style().pixelMetric(QStyle.PixelMetric.PM_TitleBarHeight)
-        self._fit_screen(QSize(0, title_bar))
+        self._fit_screen(QSize(0, self.style().pixelMetric(QStyle.PixelMetric.PM_TitleBarHeight)))
         self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or PAGES}

@@ -31,6 +31,13 @@ def test_messages_stack_without_covering_one_another(context, host):
         assert not any(one.intersects(other) for other in areas[i + 1 :])
 
 
+def test_they_are_where_no_page_has_a_main_button(context, host):
+    context.toasts.show("not saved", "fail")
+    (toast,) = context.toasts.shown()
+    assert toast.geometry().right() < host.rect().center().x() + 50
+    assert toast.geometry().bottom() > host.rect().center().y()
+
+
 def test_a_note_disappears_and_an_error_stays(context, host):
     context.toasts.show("saved")
     context.toasts.show("not saved", "fail")

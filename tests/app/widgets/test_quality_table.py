@@ -51,6 +51,14 @@ def test_its_text_can_be_copied_by_the_keyboard(widget, qtbot):
     assert words == "✓ Pass Reprojection error 0.2 px ≤ 0.3 px ✓ Pass Views used 16 ≥ 8".split()
 
 
+def test_a_figure_without_limits_has_no_verdict_and_limits_of_a_side_panel_follow_below(widget):
+    widget.set_table(QualityTable((judge("distance", "Distance", 12.0, "mm"),)))
+    shown = QTextDocumentFragment.fromHtml(widget.text()).toPlainText()
+    assert shown.split() == ["Distance", "12", "mm"]
+    narrow = QualityTableWidget.markup(table(0.2, 16), narrow=True)
+    assert narrow.count("<td") == 2 * 3
+
+
 def figure(value: float, **limits: object) -> Finding:
     return judge("key", "Label", value, **limits)  # type: ignore[arg-type]
 
