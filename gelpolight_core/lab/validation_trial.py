@@ -76,7 +76,7 @@ def recorded_validation(
     """
     objects, comparisons = dict[str, None](), list[Quantity]()
     for record in store.all(MeasurementRecord, calibration_id=calibration.identity):
-        file = Path(record.settings.get(FILE, ""))
+        file = Path(str(record.settings.get(FILE, "")))
         compared = [q for q in record.quantities if q.truth is not None]
         is_trusted = record.shape in SHAPES and record.verdict != DOUBTFUL and file.is_file()
         if compared and is_trusted and file_hash(file) not in calibration.sources:
