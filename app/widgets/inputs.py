@@ -41,6 +41,10 @@ WAITS = Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason
 """Reasons for which the focus leaves and comes back, to the same place in the text."""
 
 
+TEXT_LEFT = 5
+"""Pixels to the left of a number, as the padding of a text field."""
+
+
 class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
     """A field for a number, which it shows with a point on every system.
 
@@ -64,6 +68,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"decimals": 0, "keyboardTracking": False, **options})
+        self.lineEdit().setTextMargins(TEXT_LEFT, 0, 0, 0)
         self._pause = timer(self, PAUSE_MS, self._rest, once=True)
         self._says = timer(self, 0, self._say, once=True)
         self.lineEdit().textEdited.connect(self._on_typed)
@@ -121,7 +126,7 @@ class NumberField(_WheelNeedsFocus, QDoubleSpinBox):
     def sizeHint(self) -> QSize:
         """Return the usual size, also for what is typed."""
         if self._typed is None:
-            self._size = super().sizeHint()
+            self._size = super().sizeHint() + QSize(TEXT_LEFT, 0)
         return self._size
 
     def event(self, event: QEvent) -> bool:

@@ -97,7 +97,7 @@ QAbstractSpinBox[refused="true"] {{ border-color: {fail}; color: {fail}; }}
 QLineEdit:disabled, QAbstractSpinBox:disabled, QComboBox:disabled {{ background: {window};
     color: {disabled}; }}
 QAbstractSpinBox {{ padding-right: 18px; }}
-QAbstractSpinBox QLineEdit {{ border: none; padding: 0 0 0 5px; background: transparent; }}
+QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ border: none; width: 18px;
     background: transparent; }}
 QAbstractSpinBox::up-arrow {{ image: url("{arrow-up}"); width: 9px; height: 9px; }}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import scene
 from fake_camera import C310, FakeCamera, FakeDriver
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QSize, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
     QDesktopServices,
@@ -171,6 +171,11 @@ def test_a_page_can_keep_the_window_open_and_its_size_is_remembered(make_window,
     assert first.close()
     assert first.page("calibrate").events[-1] == "leave"
     assert make_window().size().toTuple() == (1111, 777)
+
+
+def test_the_window_can_shrink_until_it_fits_the_screen_with_its_frame(window):
+    window._fit_screen(window.screen().availableSize() - QSize(900, 600))
+    assert window.minimumSize().toTuple() == (900, 600)
 
 
 @pytest.mark.function("Find source and window size of the last run again")
