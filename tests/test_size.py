@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 # Lines that are not blank, a comment or a docstring.
-LINES = {"gelpolight_core": 36_000, "app": 22_343}
+LINES = {"gelpolight_core": 36_200, "app": 22_420}
 MARGIN = 1.02  # a usual change fits; many together do not
 
 

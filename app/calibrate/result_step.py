@@ -313,11 +313,6 @@ class ResultStep(Step):
         """Return nothing: the figures have their own place."""
         return ()
 
-    def leave(self) -> None:
-        """Make Next the main button again."""
-        super().leave()
-        set_property(self.panel.next, "primary", True)
-
     def close(self) -> None:
         """Stop the thread of the curves."""
         if "curves" in self.__dict__:
@@ -345,7 +340,6 @@ class ResultStep(Step):
         set_property(self.save, "primary", is_complete and not model.saved)
         # The report waits for the stages by itself.
         self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
-        set_property(self.panel.next, "primary", bool(model.saved))
         self._show_tab()
 
     def _draw_result(self) -> None:

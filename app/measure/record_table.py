@@ -8,10 +8,8 @@ from app.widgets.cells_table import TableCell
 from app.widgets.icons import tool_icon
 from gelpolight_core.base.compared_quantity import DECISIONS, Quantity, value_text
 from gelpolight_core.base.finding import Verdict
-from gelpolight_core.lab.measurement_record import DOUBTFUL, STORED, MeasurementRecord
+from gelpolight_core.lab.measurement_record import DOUBTFUL, FILE, STORED, MeasurementRecord
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
-
-from .reference_comparison import FILE
 
 _FIGURES = "Size or figure", "Error", "Depth", "Error"
 TITLES = ("Date", "Sensor", "Object", *_FIGURES, "Verdict", "Operator", "Note", "Image")

@@ -21,14 +21,13 @@ from app.widgets.text_roles import named_label
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import Quantity, unit_behind
-from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_record import FILE, MeasurementRecord
 from gelpolight_core.lab.measurement_store import write_csv
 from gelpolight_core.measurement.statistics import Statistics, statistics_of, too_few_repeats
 from gelpolight_core.measurement.tools.tool_registry import DEPTH_FIGURES
 
 from .record_table import IMAGE, NOTE, TITLES, record_cells, shape_label
 from .records_model import RecordsModel
-from .reference_comparison import FILE
 
 IMAGE_WIDTH = 130
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from app.program.preferences import WarningLimits
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.finding import Finding, join_reasons
-from gelpolight_core.lab.measurement_record import MeasurementRecord, verdict_of
+from gelpolight_core.lab.measurement_record import FILE, MeasurementRecord, verdict_of
 from gelpolight_core.measurement.result import compare_with_truth
 from gelpolight_core.measurement.tools.tool_base import ToolResult
 from gelpolight_core.measurement.tools.tool_registry import (
@@ -18,9 +18,6 @@ from gelpolight_core.measurement.tools.tool_registry import (
 )
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.session.reference_object import ReferenceObject
-
-FILE = "file"
-"""Setting of a record: the path of its image, empty if it was not a file."""
 
 
 def doubts_of(result: ToolResult, reference: ReferenceObject) -> tuple[Finding, ...]:

@@ -127,7 +127,7 @@ def test_reports_show_presses_and_what_is_not_known(
     results = closed_run.results.having(BALLS, slopes)
     report = calibration_report(closed_run.calibration, replace(closed_run, results=results))
     sections = {section.key: section for section in report.sections}
-    assert set(sections) == {"scale", "balls", "in_place"}
+    assert set(sections) == {"result", "scale", "balls", "in_place"}
     assert sections["balls"].listings[0].rows == (("ball_99.png", "No ball. Press one."),)
     shown = [row[0] for row in sections["in_place"].listings[0].rows]
     assert shown == [press.name for press in closed_run.results[BALLS].result.presses]
