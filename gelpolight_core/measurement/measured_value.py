@@ -273,12 +273,21 @@ def depth_at(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -> Fl
     heightmap, x_mm, y_mm
         As for :func:`value_at`.
     """
-    outside = (heightmap.flags & int(Flag.OUTSIDE)) != 0
-    depth_mm = np.where(outside, np.nan, heightmap.depth_mm.astype(np.float64))
     column, row = index_of(heightmap, x_mm, y_mm)
-    return np.asarray(
-        map_coordinates(depth_mm, np.stack([row, column]), order=1, mode="constant", cval=np.nan)
-    )
+    # Only the part around the places: a line of a live map is sampled in every frame.
+    part = tuple(map(_span, (row, column), heightmap.depth_mm.shape))
+    outside = (heightmap.flags[part] & int(Flag.OUTSIDE)) != 0
+    depth_mm = np.where(outside, np.nan, heightmap.depth_mm[part].astype(np.float64))
+    at = np.stack([row - part[0].start, column - part[1].start])
+    return np.asarray(map_coordinates(depth_mm, at, order=1, mode="constant", cval=np.nan))
+
+
+def _span(index: Float64Array, size: int) -> slice:
+    """Return the nodes of an axis around places on it, with one more on each side."""
+    known = np.clip(index[np.isfinite(index)], 0.0, size - 1.0)
+    if not known.size:
+        return slice(0, 1)
+    return slice(max(math.floor(known.min()) - 1, 0), min(math.ceil(known.max()) + 2, size))
 
 
 def flags_at(heightmap: HeightMap, x_mm: Float64Array, y_mm: Float64Array) -> NDArray[np.uint8]:
