@@ -50,14 +50,13 @@ STYLE = """
 QToolTip {{ color: {text}; background: {tip}; border: 1px solid {line}; padding: 4px; }}
 QMenuBar {{ background: {window}; }}
 QToolBar {{ background: {window}; border: none; padding: 4px 8px; spacing: 8px; }}
-QToolBar#state {{ border-bottom: 1px solid {line}; padding: 7px 16px; }}
+QToolBar#state {{ border-bottom: 1px solid {line}; }}
 QToolBar#state QToolButton, QLabel#chip {{ background: {button}; border: 1px solid transparent;
     border-radius: 14px; padding: 5px 12px; }}
 QToolBar#state QToolButton:hover {{ background: {hover}; }}
 QToolBar#state QToolButton:focus {{ border-color: {accent}; }}
 QToolBar#state QToolButton[popupMode="2"] {{ padding-right: 24px; }}
-QToolBar#navigation {{ background: {window}; border: none; border-right: 1px solid {line};
-    padding: 8px; spacing: 4px; }}
+QToolBar#navigation {{ background: {window}; border: none; border-right: 1px solid {line}; }}
 QToolBar#navigation QToolButton {{ border: 1px solid transparent; border-radius: 8px;
     padding: 8px 2px; min-width: 70px; background: transparent; color: {muted}; }}
 QToolBar#navigation QToolButton:hover {{ background: {button}; }}

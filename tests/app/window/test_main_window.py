@@ -16,12 +16,21 @@ from PySide6.QtGui import (
     QUndoCommand,
     QUndoStack,
 )
-from PySide6.QtWidgets import QApplication, QLabel, QPlainTextEdit, QPushButton, QTabWidget, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QTabWidget,
+    QToolBar,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from app.program.context import AppContext
 from app.program.preferences import WarningLimits
 from app.program.settings import AppSettings
+from app.widgets import theme
 from app.widgets.dialog import Dialog
 from app.widgets.forms import Form
 from app.window.desktop import open_files
@@ -400,6 +409,15 @@ def test_preferences_take_effect_at_once(window, tmp_path):
     folder.editingFinished.emit()
     assert folder.text() == str(tmp_path / "elsewhere")
     dialog.close()
+
+
+def test_another_theme_moves_nothing(window, qtbot):
+    bars = window.findChildren(QToolBar)
+    before = [bar.sizeHint() for bar in bars]
+    for theme_name in ("dark", "light"):
+        theme.apply(QApplication.instance(), theme_name)
+        qtbot.wait(0)
+        assert [bar.sizeHint() for bar in bars] == before
 
 
 @pytest.mark.function("See licences and versions")
