@@ -400,7 +400,7 @@ class _MapImages:
         return self._flat, self._depth_scale()
 
     def _depth_scale(self) -> ColourScale:
-        title = "processed [mm]" if self._steps else ""
+        title = "processed (mm)" if self._steps else ""
         return depth_scale(self._display.colours, self.range_mm, title)
 
     def _with_contours(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -239,7 +239,7 @@ def with_residual(shown: FrameResult, measurement: Measurement | None) -> FrameR
         return shown
     residual = fit_residual(heightmap, measurement)
     valid_mask = np.isfinite(residual)
-    scale = difference_scale(residual[valid_mask], "residual [mm]")
+    scale = difference_scale(residual[valid_mask], "residual (mm)")
     coloured = shading.apply_colour_map(np.nan_to_num(residual), scale.table, scale.low, scale.high)
     texture = np.where(valid_mask[..., None], coloured, np.uint8(128))
     return replace(shown, surface=replace(surface, texture=texture, scale=scale))

@@ -41,12 +41,12 @@ class ReferenceMap:
 
 def depth_scale(colours: str, range_mm: tuple[float, float], title: str = "") -> ColourScale:
     """Return the scale of depths."""
-    return ColourScale(title or "depth [mm]", colour_table(colours), *range_mm)
+    return ColourScale(title or "depth (mm)", colour_table(colours), *range_mm)
 
 
 def slope_scale() -> ColourScale:
     """Return the scale of slopes in degrees."""
-    return ColourScale("slope [°]", colour_table("magma"), 0.0, STEEPEST_DEG)
+    return ColourScale("slope (°)", colour_table("magma"), 0.0, STEEPEST_DEG)
 
 
 def uncertainty_scale(sd_um: Float32Array) -> ColourScale:
@@ -68,5 +68,5 @@ def difference_scale(difference_mm: Float32Array, title: str = "") -> ColourScal
     sizes = np.abs(difference_mm[np.isfinite(difference_mm)])
     top = float(np.percentile(sizes, 99.9)) if sizes.size else LEAST_DIFFERENCE_MM
     top = round_up(max(round(top, 5), LEAST_DIFFERENCE_MM))
-    title = title or "difference [mm]"
+    title = title or "difference (mm)"
     return ColourScale(title, colour_table("CET-D1"), -top, top)

@@ -103,7 +103,7 @@ def pins_text(surface: DisplaySurface, pins: tuple[PointXY, ...]) -> str:
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
 LIVE_NODES = 128
 
-MM = "[mm]"
+MM = "(mm)"
 """At the end of the titles of scales of lengths."""
 
 Rgb = tuple[int, int, int]
@@ -136,7 +136,7 @@ class ColourScale:
         if MM not in self.title:
             return self
         unit, factor = readable_unit(self.low, self.high)
-        title = self.title.replace(MM, f"[{unit_behind(unit).strip()}]")
+        title = self.title.replace(MM, f"({unit_behind(unit).strip()})")
         return replace(self, title=title, low=factor * self.low, high=factor * self.high)
 
 

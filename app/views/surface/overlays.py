@@ -5,11 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
+from matplotlib import get_data_path
 from pyvista.plotting import BasePlotter
+from vtkmodules.vtkCommonCore import VTK_FONT_FILE
 
 from app.program.display import DisplaySettings
 from app.widgets.units import length_text, round_length_mm
@@ -39,6 +42,8 @@ class SceneColours:
     font: int = 11
 
 
+FONT = str(Path(get_data_path(), "fonts", "ttf", "DejaVuSans.ttf"))
+"""VTK's own letters differ from those of the program and of its reports."""
 CURSOR = "white"
 PIN = "#ffb02e"
 CUT = "#ff5ac8"
@@ -120,8 +125,9 @@ def draw_pins(plotter: Plotter, points: Float64Array, text: str, ink: SceneColou
     names, dots = list(PIN_NAMES[: len(points)]), {"point_color": PIN, "point_size": 10}
     plates = {"shape_color": PIN, "shape_opacity": 1.0, "margin": 3, "text_color": "black"}
     how = {"render_points_as_spheres": True, "always_visible": True, "font_size": ink.font + 1}
+    plates["font_file"] = FONT
     plotter.add_point_labels(points, names, name="pins", **dots, **plates, **how, **QUIET)
-    _write(plotter, "pin-text", text, "lower_right", ink.font - 2, ink)
+    _write(plotter, "pin-text", text, "lower_right", ink)
     if len(points) == len(PIN_NAMES):
         plotter.add_mesh(pv.Line(*points), name="pin-line", color=PIN, line_width=3, **PLAIN)
 
@@ -224,7 +230,7 @@ def draw_scale(
         number + 0.5: name for number, (name, _) in enumerate(scale.names)
     }
     mapper.scalar_visibility = False  # the texture contains the colours
-    title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
+    title = scale.title.replace(" (", "\n(")  # the unit on a line of its own, for narrow views
     numbers = {"n_labels": 0 if scale.names else 5, "fmt": "{:.4g}"}
     place = {"position_x": 0.015, "position_y": 0.55, "width": 0.14, "height": 0.42}
     sizes = {"title_font_size": ink.font + 1, "label_font_size": ink.font + 1}
@@ -234,8 +240,12 @@ def draw_scale(
     bar.SetDrawAnnotations(bool(scale.names))
     if scale.names:
         bar.SetTextPositionToPrecedeScalarBar()  # puts the names on the other side
-    bar.GetAnnotationTextProperty().SetFontSize(ink.font)
-    bar.GetAnnotationTextProperty().SetColor(pv.Color(ink.text).float_rgb)
+    names = bar.GetAnnotationTextProperty()
+    names.SetFontSize(ink.font)
+    names.SetColor(pv.Color(ink.text).float_rgb)
+    for letters in (names, bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+        letters.SetFontFamily(VTK_FONT_FILE)
+        letters.SetFontFile(FONT)
 
 
 def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours, *, curved: bool) -> None:
@@ -245,7 +255,7 @@ def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours, *, cu
         text = f"Depth scaled {style.exaggeration:g} times"
         if curved:
             text = "Curved membrane, not scaled"
-        _write(plotter, "note", text, "lower_left", ink.font - 3, ink)
+        _write(plotter, "note", text, "lower_left", ink)
 
 
 def draw_scale_bar(plotter: Plotter, box: Box, style: DisplaySettings, ink: SceneColours) -> None:
@@ -267,11 +277,10 @@ def _remove(plotter: Plotter, *names: str) -> None:
         plotter.remove_actor(name, render=False)
 
 
-def _write(
-    plotter: Plotter, name: str, text: str, place: str, size: int, ink: SceneColours
-) -> None:
-    how = {"position": place, "font_size": size, "color": ink.text}
-    plotter.add_text(text, name=name, render=False, **how)
+def _write(plotter: Plotter, name: str, text: str, place: str, ink: SceneColours) -> None:
+    how = {"position": place, "color": ink.text, "font_file": FONT}
+    actor = plotter.add_text(text, name=name, render=False, **how)
+    actor.SetMaximumFontSize(ink.font + 1)  # else the letters grow with the window
 
 
 def _label(
@@ -284,4 +293,5 @@ def _label(
     **how: Any,
 ) -> None:
     options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
+    options["font_file"] = FONT
     plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)

@@ -34,11 +34,11 @@ def test_measured_lengths_keep_their_uncertainty_and_other_units_stay():
 def test_an_axis_and_a_colour_bar_have_one_unit_for_all_numbers(dome, qtbot):
     assert "x 2.00" in read_at(dome, 2.0, -1.0).detail()
     table = np.zeros((256, 3), np.uint8)
-    scale = ColourScale("depth [mm]", table, -0.01, 0.05).in_unit()
-    assert (scale.title, scale.low, scale.high) == ("depth [µm]", -10.0, 50.0)
-    deep = ColourScale("depth [mm]", table, -0.01, 0.5).in_unit()
-    assert (deep.title, deep.low, deep.high) == ("depth [mm]", -0.01, 0.5)
-    slope = ColourScale("slope [°]", table, 0.0, 0.05)
+    scale = ColourScale("depth (mm)", table, -0.01, 0.05).in_unit()
+    assert (scale.title, scale.low, scale.high) == ("depth (µm)", -10.0, 50.0)
+    deep = ColourScale("depth (mm)", table, -0.01, 0.5).in_unit()
+    assert (deep.title, deep.low, deep.high) == ("depth (mm)", -0.01, 0.5)
+    slope = ColourScale("slope (°)", table, 0.0, 0.05)
     assert slope.in_unit() is slope
     plot = ProfilePlot("plot")
     qtbot.addWidget(plot)

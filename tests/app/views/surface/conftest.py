@@ -47,7 +47,7 @@ def made(heightmap):
         depth = np.float32(factor) * heightmap.depth_mm
         table = colour_table("viridis")
         texture = table[np.clip(255.0 * depth, 0.0, 255.0).astype(np.uint8)]
-        scale = ColourScale("depth [mm]", table, *RANGE_MM)
+        scale = ColourScale("depth (mm)", table, *RANGE_MM)
         settled = {"range_mm": RANGE_MM, "depth_mm": depth, **how}
         found = surface_of(heightmap, texture, scale, **settled)  # type: ignore[arg-type]
         assert found is not None

@@ -26,14 +26,14 @@ def test_the_depth_at_a_point_equals_that_of_the_map(made, largest):
 
 def test_an_empty_working_area_has_no_surface(heightmap):
     heightmap.flags[:] = 1
-    scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)
+    scale = ColourScale("depth (mm)", np.zeros((256, 3), np.uint8), 0.0, 1.0)
     texture = np.zeros((8, 8, 3), np.uint8)
     assert surface_of(heightmap, texture, scale, range_mm=(0.0, 1.0)) is None
 
 
 def test_a_curved_membrane_is_shown_itself(heightmap):
     cap = MembraneShape("spherical_cap", 2.0, 18.0, (0.5, -0.25))
-    scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)
+    scale = ColourScale("depth (mm)", np.zeros((256, 3), np.uint8), 0.0, 1.0)
     texture = np.zeros((8, 8, 3), np.uint8)
     found = surface_of(replace(heightmap, at_rest=cap), texture, scale, range_mm=(0.0, 1.0))
     assert found is not None

@@ -16,7 +16,7 @@ from shiboken6 import getAllValidWrappers
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
 from app.views.map.colour_tables import colour_table
-from app.views.surface.overlays import VIEWS, axes_marks
+from app.views.surface.overlays import FONT, VIEWS, axes_marks
 from app.views.surface.panel import SurfacePanel
 from app.widgets.layout import hbox
 from tests.app.views.surface.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
@@ -210,6 +210,14 @@ def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
 
     qtbot.waitUntil(from_the_top, timeout=WAIT_MS)
     assert view.camera.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+
+
+def test_letters_of_the_view_are_of_one_kind_and_size(panel):
+    panel.display.change(exaggeration=3.0)
+    note, scale = panel.view.renderer.actors["note"], panel.view.scalar_bar
+    letters = note.GetTextProperty(), scale.GetTitleTextProperty(), scale.GetLabelTextProperty()
+    assert {one.GetFontFile() for one in letters} == {FONT}
+    assert note.GetMaximumFontSize() == scale.GetLabelTextProperty().GetFontSize()
 
 
 def test_the_style_is_remembered(panel, settings, qtbot):
