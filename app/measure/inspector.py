@@ -268,9 +268,9 @@ def _lines(budget: tuple[tuple[str, ...], ...]) -> str:
 
 
 def _row(row: ResultRow) -> str:
-    label = f"<td style='white-space:nowrap'>{escaped(row.label)}</td>"
+    label = f"<td>{escaped(row.label)}</td>"
     if not row.reference:
-        sd = f"<td colspan='2'><span style='color:@muted'>{row.sd}</span></td>"
+        sd = f"<td colspan='2' style='white-space:nowrap;color:@muted'>{row.sd}</td>"
         return f"<tr>{label}{_cell(row.measured)}{sd}</tr>"
     first = "".join(map(_cell, (row.measured, row.reference, row.deviation)))
     second = _cell(row.sd, "muted") + _cell("") + _cell(row.percent, row.role)

@@ -99,6 +99,7 @@ class ToolList(QListWidget):
         set_names(self, "measure.tools", "Tools on the image")
         self._work = work
         self.setIconSize(QSize(16, 16))
+        self.setWordWrap(True)  # a value is never cut
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.itemClicked.connect(lambda item: work.choose(item.data(Qt.ItemDataRole.UserRole)))
 
@@ -110,7 +111,7 @@ class ToolList(QListWidget):
             value = "" if answer.refused else "…"
             if answer.result is not None:
                 first = answer.result.figures[0]
-                value = value_text(first.value, unit=first.unit)
+                value = value_text(first.value, unit=first.unit).replace(" ", "\N{NO-BREAK SPACE}")
             entry = palette_entry(tool.name)
             item = QListWidgetItem(icon(tool_icon(tool.name)), f"{entry.label} {value}")
             item.setData(Qt.ItemDataRole.UserRole, key)

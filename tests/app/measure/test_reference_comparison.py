@@ -6,13 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.measure.inspector import _table
 from app.measure.measurement_engine import MeasuredImage, ToolOutcome
-from app.measure.press_state import PressState, resolve_press
+from app.measure.press_state import PressState, ResultRow, resolve_press
 from app.measure.record_table import record_cells
 from app.measure.records_view import errors_over_time
 from app.measure.reference_comparison import quantities_of, record_of
 from app.program.preferences import WarningLimits
 from app.widgets.icons import icon
+from app.widgets.label import MarkupLabel
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.finding import Verdict, doubtful_finding
 from gelpolight_core.geometry.membrane_shape import MembraneShape
@@ -149,3 +151,13 @@ def test_a_record_of_a_tool_that_is_not_installed_any_more_has_a_name_and_an_ico
     cell = record_cells(MeasurementRecord("A", "A-1", "depth_at", (Quantity("depth_mm", 1.0),)))[2]
     assert cell.text == "Depth at"
     icon(cell.icon, cell.role)
+
+
+def test_a_long_label_breaks_rather_than_the_deviations(qtbot):
+    def height(label: str) -> int:
+        rows = (ResultRow("Diameter", "5.41", "± 0.23"), ResultRow("Centre x", "41", "± 157"))
+        table = MarkupLabel(_table((*rows, ResultRow(label, "0.296", ""))), wrap=True)
+        qtbot.addWidget(table)
+        return table.heightForWidth(272)
+
+    assert height("Deviation from a circle, RMS") - height("RMS") < height("RMS") / 3
