@@ -250,6 +250,8 @@ def _crossings(
     crossings = np.flatnonzero(above[1:] != above[:-1])
     if crossings.size < 2 or above[0] != above[-1]:
         text = f"the profile does not cross {level:.4f} mm twice"
+        if depth.min() == depth.max():
+            text = "the membrane is flat along the line"
         raise InputError(text, "width of a profile", Remedy.DRAW_AGAIN)
     outermost = [
         _LevelCrossing(
