@@ -52,6 +52,9 @@ def test_the_width_of_a_roof_at_a_level_and_at_half_its_height():
     assert (left, right, level) == pytest.approx((3.8, 6.8, 0.25), abs=1e-4)
     with pytest.raises(InputError, match="twice"):
         width_at(profile, 2.0)
+    bare = take_profile(made(lambda x, y: 0.0 * x), (-5.0, 1.0), (5.0, 1.0))
+    with pytest.raises(InputError, match="flat"):
+        width_at(bare)
 
 
 def test_a_stair_has_its_step():
