@@ -48,10 +48,9 @@ class ResultPlot(QFrame):
         self.setObjectName("card")
         self.picture = picture
         from_above = not any(picture.labels)
-        title, caption = (
-            PlainLabel(picture.title, wrap=True),
-            PlainLabel(picture.caption, wrap=True),
-        )
+        tip = " Click a bar to open its press." if self.bar_at(0.0) else ""
+        title = PlainLabel(picture.title, wrap=True)
+        caption = PlainLabel(picture.caption + tip, wrap=True)
         make_bold(title)
         set_text_role(caption, "muted")
         self._bar: pg.ColorBarItem | None = None

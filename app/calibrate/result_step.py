@@ -156,7 +156,9 @@ def drawn_result(project: CalibrationProject, workspace: Workspace) -> DrawnResu
             continue
         figure = main_figure(summary.quality.values())
         if figure is not None:
-            earlier = f"The last one, {summary.created[:10]}: {figure.value_text}"
+            earlier = (
+                f"Last calibration of this sensor, {summary.created[:10]}: {figure.value_text}"
+            )
             break
     return DrawnResult(result_pictures(c, run), terms, earlier)
 
@@ -321,8 +323,7 @@ class ResultStep(Step):
     def refresh(self) -> None:
         """Show the present state of every stage."""
         model, statuses = self.model, self.model.statuses
-        text = f"Saved as {model.saved}. Validate it next."
-        self.saved.setText(text if model.saved else "")
+        self.saved.setText(f"Saved as {model.saved}." if model.saved else "")
         _, tables = cause_and_rest({key: status.quality for key, status in statuses.items()})
         mend = self._mend()
         cause = "" if mend is None else mend.text

@@ -58,14 +58,15 @@ def term_facts(full: FullModel) -> tuple[tuple[str, str, bool], ...]:
             continue
         gain, scatter = full.evidence[term.key]
         change = "falls" if gain > 0.0 else "rises"
-        worth = f"the misfit of held-out presses {change} by {abs(gain):.3g} (sd {scatter:.2g})"
+        size, sd = (f"{v:,.0f}" if abs(v) >= 100.0 else f"{v:.2g}" for v in (abs(gain), scatter))
+        worth = f"chi square of held-out presses {change} by {size} (sd {sd})"
         fitted = [
             f"{p.name} {values[p.full_key]:.3g} (sd {full.membrane_sd[p.full_key]:.2g})"
             for p in term.parameters
             if p.full_key in full.membrane_sd and p.full_key in values
         ]
         is_needed = term.parameters[0].full_key in full.membrane_sd
-        parts = (*fitted, worth) if is_needed else ("not needed", worth)
+        parts = (*fitted, worth) if is_needed else ("not clearly needed", worth)
         facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts), is_needed))
     return tuple(facts)
 

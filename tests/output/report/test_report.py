@@ -125,7 +125,7 @@ def test_a_report_says_which_terms_held_out_presses_ask_for(small_calibration):
     name_by_key = {term.key: term.name.lower() for term in TERMS}
     stretch, lobe = (facts[name_by_key[key]] for key in ("stretch", "lobe"))
     assert "0.12" in stretch and "83" in stretch and "9.1" in stretch
-    assert "not needed" in lobe and "rises by 0.2" in lobe
+    assert "not clearly needed" in lobe and "rises by 0.2" in lobe
     # A calibration by an earlier program has none of this.
     assert not facts_of_terms(small_calibration.changed(full=replace(full, evidence={})))
 
