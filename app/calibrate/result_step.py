@@ -30,13 +30,12 @@ from gelpolight_core.base.finding import (
     worst_of,
 )
 from gelpolight_core.base.root_causes import best_cause, cause_and_rest
-from gelpolight_core.calibration.joint_stage import term_facts
+from gelpolight_core.calibration.joint_stage import JOINT, term_facts
 from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
-from gelpolight_core.sensor.sensor_calibration import OpenSensor
 
 from .image_panels import MapsView, most_oblique_press
 from .image_step import ImageStep
@@ -141,8 +140,8 @@ def drawn_result(project: CalibrationProject, workspace: Workspace) -> DrawnResu
 
     run = project.finish()
     c, terms, earlier = run.calibration, "", ""
-    if isinstance(c.data, OpenSensor) and c.data.full is not None:
-        facts = term_facts(c.data.full)
+    if (joint := run.results.get(JOINT)) is not None:
+        facts = term_facts(joint.full)
         for title, wanted in (("What this sensor needs", True), ("Left out", False)):
             rows = [
                 f"<br>{escaped(f'{name}: {text}')}"

@@ -18,9 +18,10 @@ class PageEntry:
 
     A page is a QWidget whose class takes the keyword ``context`` (an AppContext). Optional methods:
     ``enter()`` and ``leave()`` (the page becomes visible or hidden), ``can_close() -> bool`` (asked
-    before the window closes), ``open_path(path)`` (a folder or file was dropped or chosen),
-    ``export_actions()`` (items of File > Export), ``begin()`` (start with a new sensor) and
-    ``begin_demo()`` (use the virtual sensor). Its ``history`` is the QUndoStack of the Edit menu.
+    before the window closes), ``unfinished() -> str`` (what would be lost then),
+    ``open_path(path)`` (a folder or file was dropped or chosen), ``export_actions()`` (items of
+    File > Export), ``begin()`` (start with a new sensor) and ``begin_demo()`` (use the virtual
+    sensor). Its ``history`` is the QUndoStack of the Edit menu.
 
     Attributes
     ----------

@@ -20,14 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL, stated_sd
+from gelpolight_core.geometry.length_tolerances import HEIGHT_BY_LATERAL
 from gelpolight_core.reconstruction.height_map import COARSE, HeightMap
 from gelpolight_core.reconstruction.modes import FULL, IN_PLACE, PAPER, Mode
 from gelpolight_core.reconstruction.near_light.contact_detection import MARGIN_DECAYS
 from gelpolight_core.reconstruction.near_light.effort_parameters import SETTINGS
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
-from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
+from gelpolight_core.sensor.sensor_calibration import Calibration
 
 from .indenter_fit import IndenterFit
 from .map_slopes import are_solved, smoothing_of
@@ -135,7 +134,7 @@ def expected_sd(c: Calibration, shape: str, size_mm: float, height_mm: float) ->
     Parameters
     ----------
     c : Calibration
-        Of an open sensor with its full model, or of a closed one.
+        With errors of lengths.
     shape : str
         ``ball`` or ``cylinder``.
     size_mm : float
@@ -143,27 +142,15 @@ def expected_sd(c: Calibration, shape: str, size_mm: float, height_mm: float) ->
     height_mm : float
         Its depth.
     """
-    values = dict.fromkeys(("x_mm", "y_mm"), 0.0) | {"height_mm": height_mm}
-    values |= {"diameter_mm": size_mm, "drape_decay_mm": DECAY_MM}
-    floor_mm = blur_mm = 0.0
-    if isinstance(c.data, ClosedSensor):
-        closed = c.data.in_place
-        pitch_mm, lateral = closed.grid.pitch_mm, closed.scale_sd
-        depth = math.hypot(closed.errors.depth_share, 2.0 * lateral)
-        floor_mm, blur_mm = closed.errors.depth_floor_mm, closed.smoothing_nodes * pitch_mm
-    else:
-        data = c.data_of(OpenSensor)
-        full, pitch_mm = data.full, data.table.grid.pitch_mm
-        assert full is not None and full.scale_sd is not None, "a calibration states both"
-        values["drape_decay_mm"] = full.decay_mm or DECAY_MM
-        scale, lengths = full.scale_sd, stated_sd(data.stack, full.scale_sd.shown)
-        depth, lateral = (
-            math.hypot(scale.depth, lengths.depth),
-            math.hypot(scale.lateral, lengths.lateral),
-        )
-    error = MODE_ERRORS[Mode(c.model, EFFORTS[-1])]
-    mode = replace(error, node_mm=pitch_mm * error.node_mm, level_mm=floor_mm, blur_mm=blur_mm)
-    by_calibration = calibration_sd(shape, values, depth, lateral, mode.depth_by_lateral)
+    errors = c.data.length_errors
+    assert errors is not None, "the calibration states no errors of lengths"
+    values = {"x_mm": 0.0, "y_mm": 0.0, "height_mm": height_mm, "diameter_mm": size_mm}
+    values["drape_decay_mm"] = errors.decay_mm or DECAY_MM
+    mode = MODE_ERRORS[Mode(c.model, EFFORTS[-1])]
+    node_mm = errors.pitch_mm * mode.node_mm
+    mode = replace(mode, node_mm=node_mm, level_mm=errors.floor_mm, blur_mm=errors.blur_mm)
+    scales = errors.depth, errors.lateral
+    by_calibration = calibration_sd(shape, values, *scales, mode.depth_by_lateral)
     by_mode = _mode_sd(shape, values, mode)
     return {name: math.hypot(sd, by_mode.get(name, 0.0)) for name, sd in by_calibration.items()}
 

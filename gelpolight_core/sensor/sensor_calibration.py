@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,6 +24,7 @@ from gelpolight_core.base.finding import (
 from gelpolight_core.base.identity import identity_text
 from gelpolight_core.base.membrane_masks import saturated_mask
 from gelpolight_core.geometry.camera import CameraModel
+from gelpolight_core.geometry.length_tolerances import stated_sd
 from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.geometry.refraction import LayerStack, build_stack, membrane_to_camera
 from gelpolight_core.geometry.resampling import (
@@ -39,6 +41,7 @@ from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.light.directions import flat_cosines
 from gelpolight_core.light.membrane_brdf import MembraneBrdf
 from gelpolight_core.light.reflectance_table import ReflectanceTable
+from gelpolight_core.sensor.length_errors import LengthErrors
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.session.validation import Validation
 from gelpolight_core.stages.flat_field.factor_map import LEAST_FACTOR
@@ -232,6 +235,10 @@ class SensorModel(BackgroundReference, Protocol):
     def to_pixels(self, points_mm: Float64Array) -> Float64Array:
         """Return the camera pixels (N, 2) that see points (N, 2) of the undeformed membrane."""
 
+    @property
+    def length_errors(self) -> LengthErrors | None:
+        """Errors of lengths; None if the calibration does not state them."""
+
 
 @dataclass(frozen=True)
 class OpenSensor:
@@ -312,6 +319,18 @@ class OpenSensor:
     def stack(self) -> LayerStack:
         """The layers between camera and top surface."""
         return sensor_stack(self.sensor, self.plane)
+
+    @cached_property
+    def length_errors(self) -> LengthErrors | None:
+        """Errors of lengths by calibration and stated lengths; None without them."""
+        if self.full is None or (scale := self.full.scale_sd) is None:
+            return None
+        stated = stated_sd(self.stack, scale.shown)
+        depth, lateral = (
+            math.hypot(scale.depth, stated.depth),
+            math.hypot(scale.lateral, stated.lateral),
+        )
+        return LengthErrors(depth, lateral, self.table.grid.pitch_mm, self.full.decay_mm)
 
     @cached_property
     def table(self) -> ResamplingTable:

@@ -18,8 +18,10 @@ from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.compared_quantity import COVERAGE, PAPER_PERCENT
 from gelpolight_core.calibration.closed_sensor_recipe import BALLS as CLOSED_BALLS
 from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import LENS, TOP_POSE
 from gelpolight_core.calibration.project import CalibrationRun
+from gelpolight_core.calibration.recipes import recipe_named
 from gelpolight_core.calibration.refinement_stage import RefinementStageResult
 from gelpolight_core.measurement.size_uncertainty import expected_sd
 from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
@@ -36,8 +38,8 @@ DIVERGING = np.concatenate(
 LED_ROLES: tuple[Role, ...] = ("red", "green", "blue")
 DEPTHS_MM = np.geomspace(0.1, 1.5, 40)
 """Depths for which the uncertainty is predicted."""
-BALL_MM = 10.0
-"""Diameter of the ball for which that of a closed sensor is predicted: it hardly matters."""
+CYLINDER_MM, BALL_MM = 5.0, 10.0
+"""Objects for which it is predicted, on open and on closed sensors: the size hardly matters."""
 INWARDS = 0.78
 """Place of an LED's text between the middle and the LED."""
 MOST_NAMES = 20
@@ -129,18 +131,27 @@ def result_pictures(c: Calibration, run: CalibrationRun | None) -> tuple[ResultP
     run : CalibrationRun or None
         The results of its stages; without them, the pictures of single presses are left out.
     """
-    if isinstance(c.data, ClosedSensor):
-        pictures = [_uncertainty(c)]
-        names, errors = tuple(ball[0] for ball in c.data.balls), np.full(len(c.data.balls), np.nan)
-        if run is not None:
-            presses = run.results[CLOSED_BALLS].result.presses
-            errors = np.array([press.held_out.cap_ratio - 1.0 for press in presses])
-            pictures.insert(0, _bars(c, "held_out_cap_percent", names, errors))
-        rings = tuple((x, y, contact) for _, x, y, contact, _ in c.data.balls)
-        return (*pictures, _plan(names, rings))
+    return next(
+        draw(c, run) for stage, draw in DRAWN.items() if stage in recipe_named(c.model).stages
+    )
+
+
+def _of_closed(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
+    balls = c.data_of(ClosedSensor).balls
+    names = tuple(ball[0] for ball in balls)
+    plan = _plan(names, tuple((x, y, contact) for _, x, y, contact, _ in balls))
+    expected = _uncertainty(c, "ball", BALL_MM)
+    if run is None:
+        return expected, plan
+    presses = run.results[CLOSED_BALLS].result.presses
+    errors = np.array([press.held_out.cap_ratio - 1.0 for press in presses])
+    return _bars(c, "held_out_cap_percent", names, errors), expected, plan
+
+
+def _of_open(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
     data = c.data_of(OpenSensor)
     joint: RefinementStageResult | None = None if run is None else run.results.get(JOINT)
-    stated = () if data.full is None or data.full.scale_sd is None else (_uncertainty(c),)
+    stated = () if data.length_errors is None else (_uncertainty(c, "cylinder", CYLINDER_MM),)
     leds, factor = _leds(data)
     about = f"Ellipses: two standard deviations of the LEDs, drawn {factor:.0f} times as large."
     if run is None or joint is None or joint.checked is None:
@@ -153,6 +164,10 @@ def result_pictures(c: Calibration, run: CalibrationRun | None) -> tuple[ResultP
     )
     plan = _plan(joint.refined.ball_names, rings, (*_boards(run), *leds), f"{BOARDS} {about}")
     return bars, *stated, plan, _left(data, checked.left, checked.step)
+
+
+DRAWN = {REFLECTANCE: _of_open, CLOSED_BALLS: _of_closed}
+"""The pictures of a recipe that has a stage."""
 
 
 def _bars(c: Calibration, key: str, names: Sequence[str], errors: Float64Array) -> ResultPicture:
@@ -175,9 +190,8 @@ def _bars(c: Calibration, key: str, names: Sequence[str], errors: Float64Array) 
     )
 
 
-def _uncertainty(c: Calibration) -> ResultPicture:
+def _uncertainty(c: Calibration, shape: str, size_mm: float) -> ResultPicture:
     """Return what the uncertainty of a measured object will be, by its depth."""
-    shape, size_mm = ("ball", BALL_MM) if isinstance(c.data, ClosedSensor) else ("cylinder", 5.0)
     sds = [expected_sd(c, shape, size_mm, float(depth_mm)) for depth_mm in DEPTHS_MM]
     height, across = (
         100.0 * COVERAGE * np.array([sd[name] for sd in sds])

@@ -209,7 +209,7 @@ class InPlaceSolver:
             record.add_skipped("normals", "not requested")
         if not request.uncertainty:
             record.add_skipped("standard deviations", "not requested")
-        fitted = surface_slopes(depth, model.grid.pitch_mm)
+        fitted, lengths = surface_slopes(depth, model.grid.pitch_mm), self.calibration.length_errors
         normals = self._normals(*fitted) if request.normals else None
         return DepthSolution(
             depth,
@@ -223,10 +223,9 @@ class InPlaceSolver:
             self._deviations(linear, request, depth, slope_x, slope_y)
             if request.uncertainty
             else None,
-            # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
-            depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
-            lateral_scale_sd=model.scale_sd,
-            image_blur_mm=model.smoothing_nodes * model.grid.pitch_mm,
+            depth_scale_sd=lengths.depth,
+            lateral_scale_sd=lengths.lateral,
+            image_blur_mm=lengths.blur_mm,
         )
 
     def _misfit(

@@ -10,7 +10,6 @@ change are stated with each constant and held by tests.
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
@@ -24,7 +23,6 @@ from numpy.typing import NDArray
 from gelpolight_core.base.arrays import BoolArray, Float32Array
 from gelpolight_core.base.errors import InputError, Remedy
 from gelpolight_core.base.finding import Finding
-from gelpolight_core.geometry.length_tolerances import stated_sd
 from gelpolight_core.health.contact_residual import ContactLightResidual
 from gelpolight_core.image.coded import coded
 from gelpolight_core.reconstruction.buffers import BufferPool
@@ -196,7 +194,7 @@ class NearLightSolver(OpenSolver):
         flags = self.maps.flags.copy()
         normals = self.maps.normals_at_rest.copy() if request.normals else None
         noise, notes = None, list(self._condition_notes)
-        grid, full = self.calibration.table.grid, self.maps.full
+        grid = self.calibration.table.grid
         with self._lock:
             image = self._image(frame, request)
             region = self._region(image, record, request.everywhere)
@@ -232,8 +230,7 @@ class NearLightSolver(OpenSolver):
             record.add_skipped("normals", "not requested")
         if not request.uncertainty:
             record.add_skipped("standard deviations", "not requested")
-        scale, blur_px = full.scale_sd, self.calibration.lens_blur_px
-        lengths = stated_sd(self.calibration.stack, None if scale is None else scale.shown)
+        errors, blur_px = self.calibration.length_errors, self.calibration.lens_blur_px
         return DepthSolution(
             depth,
             normals,
@@ -241,8 +238,8 @@ class NearLightSolver(OpenSolver):
             tuple(notes),
             Trace(request.effort, tuple(record.steps)),
             noise,
-            depth_scale_sd=None if scale is None else math.hypot(scale.depth, lengths.depth),
-            lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, lengths.lateral),
+            depth_scale_sd=None if errors is None else errors.depth,
+            lateral_scale_sd=None if errors is None else errors.lateral,
             visible_depth_mm=None if request.everywhere else self.visible_mm,
             image_blur_mm=None if blur_px is None else blur_px * grid.pitch_mm,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,6 +17,7 @@ from gelpolight_core.health.press_scatter import KINDS, OLDER_KINDS
 from gelpolight_core.image.bad_pixels import BadPixels, no_bad_pixels
 from gelpolight_core.image.grain import Grain
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.sensor.length_errors import LengthErrors
 
 from .colour_change import SMOOTHING_NODES
 from .polynomial_terms import TERMS
@@ -68,6 +70,19 @@ class ClosedSensor:
     def bad_pixels(self) -> BadPixels:
         """No bad pixels: a closed sensor is not searched for them."""
         return no_bad_pixels(self.camera.height, self.camera.width)
+
+    @property
+    def length_errors(self) -> LengthErrors:
+        """Errors of lengths, by presses that were left out and by the scale."""
+        model, pitch_mm = self.in_place, self.in_place.grid.pitch_mm
+        return LengthErrors(
+            # A slope is a ratio of two lengths of the ball; a height is a slope times a length.
+            math.hypot(model.errors.depth_share, 2.0 * model.scale_sd),
+            model.scale_sd,
+            pitch_mm,
+            floor_mm=model.errors.depth_floor_mm,
+            blur_mm=model.smoothing_nodes * pitch_mm,
+        )
 
     @property
     def background(self) -> NDArray[np.float32]:
