@@ -82,7 +82,7 @@ class WizardModel(QObject):
         super().__init__(window)
         self.project, self.context = project, context
         self.undo = QUndoStack(self)
-        self.live = LiveSession(context=context, name="detection", parent=self)
+        self.live = LiveSession(context=context, name="detection", keeps_seen=True, parent=self)
         self.live.use(False)  # until a step needs images
         self.live_detection = LiveDetection(self.live)
         self.jobs, self.short_jobs = JobQueue("computing", self), JobQueue("short jobs", self)
@@ -159,7 +159,8 @@ class WizardModel(QObject):
 
         # A toast, not the page: the user has already left the step.
         aborted = partial(self.context.toasts.show, verdict="fail")
-        self.live.capture(frames, keep, self.refused.emit, aborted=aborted)
+        still_s = self.live_detection.still_s
+        self.live.capture(frames, keep, self.refused.emit, aborted=aborted, still_s=still_s)
 
     def import_files(
         self, stage: str, files: Sequence[Path], *, radius_mm: float | None = None

@@ -94,6 +94,11 @@ class LiveDetection(QObject):
 
         self._live.process(detect_frame)
 
+    @property
+    def still_s(self) -> tuple[float, float]:
+        """Times from and to which the frames show the same as the last one."""
+        return self._movement.still_s
+
     def count_movement(self) -> None:
         """Note that the scene is another one, even if it looks the same."""
         self._movement.moved = True

@@ -16,6 +16,7 @@ from app.sources.source import Source, SourceFrame
 from app.sources.stoppable_thread import PROCESSING
 from app.sources.stream import Stream
 from app.widgets.timers import timer
+from gelpolight_core.image.change_detection import NEVER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,8 @@ class LiveSession(QObject):
         Holds the source that all pages share.
     name : str
         Name of the processing thread.
+    keeps_seen : bool, optional
+        Whether captures can use frames that were already seen.
     parent : QObject, optional
         Owner.
 
@@ -67,9 +70,16 @@ class LiveSession(QObject):
     lost = Signal(str)
     processed = Signal(object)
 
-    def __init__(self, *, context: AppContext, name: str, parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        context: AppContext,
+        name: str,
+        keeps_seen: bool = False,
+        parent: QObject | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._context = context
+        self._context, self._keeps_seen = context, keeps_seen
         self.stream: Stream | None = None
         self.page_shown, self._wanted = False, True
         self.paused = self._resting = False
@@ -101,7 +111,7 @@ class LiveSession(QObject):
         self._close()
         info = self._context.source.info
         if info is not None and self.page_shown and self._wanted:
-            self.stream = Stream(info.open())
+            self.stream = Stream(info.open(), keeps_seen=self._keeps_seen)
             if not self.paused:
                 self.stream.add_tap(self._latest.submit)
             self.stream.start()
@@ -198,8 +208,9 @@ class LiveSession(QObject):
         failed: Callable[[str], object],
         *,
         aborted: Callable[[str], object] | None = None,
+        still_s: tuple[float, float] = NEVER_S,
     ) -> None:
-        """Collect the next frames that show the present state of the source.
+        """Collect frames that show the present state of the source.
 
         A second capture before the first one has ended is ignored.
 
@@ -213,13 +224,15 @@ class LiveSession(QObject):
             Called with a sentence instead if they cannot be captured.
         aborted : callable, optional
             Called with a sentence instead if the source is closed meanwhile. Default: `failed`.
+        still_s : (float, float), optional
+            As in :meth:`app.sources.stream.Stream.capture`.
         """
         if self._capture is not None:
             return
         if self.stream is None:
             failed("There is no camera. Select a source first.")
             return
-        frames = self.stream.capture(count)
+        frames = self.stream.capture(count, still_s)
         self._capture = _PendingCapture(frames, done, failed, aborted or failed)
 
     def _poll(self) -> None:

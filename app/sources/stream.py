@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.image.change_detection import NEVER_S
 
 from .latest import Mailbox
 from .source import Source, SourceFrame, SourceLost, SourceUnavailable
@@ -20,6 +21,9 @@ _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 5.0
 """A source without frames for this long, after it has delivered some, counts as lost."""
+
+MOST_SEEN = 16
+"""Frames that a capture averages at the most, and may take from those already seen."""
 
 Tap = Callable[[SourceFrame], object]
 
@@ -59,6 +63,8 @@ class Stream(StoppableThread):
     ----------
     source : Source
         Need not be open. The stream owns it from now on.
+    keeps_seen : bool, optional
+        Whether to keep the last `MOST_SEEN` settled frames for captures.
 
     Attributes
     ----------
@@ -69,9 +75,10 @@ class Stream(StoppableThread):
         tap.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, *, keeps_seen: bool = False) -> None:
         super().__init__(f"capture {source.name}")
         self.source = source
+        self._seen: deque[SourceFrame] = deque(maxlen=MOST_SEEN * keeps_seen)
         self.newest: Mailbox[SourceFrame] = Mailbox()
         self._lock = threading.Lock()
         self._taps: list[Tap] = []
@@ -93,8 +100,17 @@ class Stream(StoppableThread):
         with self._lock:
             self._taps = [other for other in self._taps if other != tap]
 
-    def capture(self, count: int) -> Future[list[SourceFrame]]:
-        """Collect the next `count` settled frames that are made after this call.
+    def capture(
+        self, count: int, still_s: tuple[float, float] = NEVER_S
+    ) -> Future[list[SourceFrame]]:
+        """Collect settled frames: the newest of those already seen, then those made from now on.
+
+        Parameters
+        ----------
+        count : int
+            Number of frames.
+        still_s : (float, float), optional
+            Times from and to which seen frames show what is to be captured. Default: none does.
 
         Returns
         -------
@@ -106,7 +122,12 @@ class Stream(StoppableThread):
         request = _CaptureRequest(count, time.monotonic(), Future())
         with self._lock:
             if self._thread is not None and self._lost is None and not self._end.is_set():
-                self._captures.append(request)
+                seen = [f for f in self._seen if still_s[0] <= f.time_s <= still_s[1]]
+                request.frames += seen[-count:]
+                if len(request.frames) == count:
+                    request.future.set_result(request.frames)
+                else:
+                    self._captures.append(request)
                 return request.future
             reason = self._lost
         request.future.set_exception(reason or self._stopped())
@@ -127,6 +148,7 @@ class Stream(StoppableThread):
             self._last_number = -1
             self._received = 0
             self._lost: InputError | None = None
+            self._seen.clear()
 
     def _run(self, end: threading.Event) -> None:
         lost: InputError | None = None
@@ -173,6 +195,10 @@ class Stream(StoppableThread):
             self._times.append(time.monotonic())
             self._last_number = max(self._last_number, frame.number)
             self._received += 1
+            if not frame.settled:
+                self._seen.clear()  # they show what is being changed
+            else:
+                self._seen.append(frame)
             taps, captures = tuple(self._taps), tuple(self._captures)
         for tap in taps:
             try:

@@ -6,6 +6,7 @@ scene differ anyway.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -19,6 +20,8 @@ SIGMAS = 4.0
 """Exceeded by chance, upwards, by one of 30,000 levels."""
 LASTS_S = 0.5
 """What lasts so long is a state; hands and released objects shake for a few tenths of a second."""
+NEVER_S = (math.inf, -math.inf)
+"""An empty range of times."""
 BLOCK_PX = 8
 """Averaging over blocks of this side raises a movement above the noise of single pixels."""
 STILL_SHARE = 0.001
@@ -209,6 +212,8 @@ class StillnessDetector:
     ----------
     moved : bool
         Whether something has moved between two frames since this was set to False.
+    still_s : (float, float)
+        Times of the first and the last frame without movement. Empty (inf, -inf) while it moves.
     """
 
     def __init__(self) -> None:
@@ -217,14 +222,16 @@ class StillnessDetector:
 
     def restart(self) -> None:
         """Begin again with another camera."""
+        self.still_s = NEVER_S
         self._before: FrameArray | None = None
         self._still = Debouncer()
 
     def update(self, rgb: FrameArray, time_s: float) -> float:
         """Add a frame at a time and return the share of `LASTS_S` without movement."""
         before, self._before = self._before, rgb
-        if before is None or before.shape != rgb.shape or before.dtype != rgb.dtype:
-            return self._still.update(False, time_s)
-        still = changed_share(before, rgb) <= STILL_SHARE
-        self.moved = self.moved or not still
+        still = False
+        if before is not None and before.shape == rgb.shape and before.dtype == rgb.dtype:
+            still = changed_share(before, rgb) <= STILL_SHARE
+            self.moved = self.moved or not still
+        self.still_s = (min(self.still_s[0], time_s), time_s) if still else NEVER_S
         return self._still.update(still, time_s)

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.image.change_detection import (
+    NEVER_S,
     STILL_SHARE,
     StillnessDetector,
     changed_share,
@@ -81,3 +82,12 @@ def test_a_movement_is_remembered_until_it_is_used():
         moved.append(detector.moved)
         detector.moved = detector.moved and n < 14
     assert moved == [False] * 10 + [True] * 5 + [False] * 5
+
+
+def test_the_still_time_begins_after_the_last_movement():
+    detector, positions = StillnessDetector(), [0.0, 0.0, 3.0, 6.0, 6.0, 6.0]
+    ranges = []
+    for i, shift_px in enumerate(positions):
+        detector.update(shot(scene(shift_px), i, noise=0.005), 10.0 + i)
+        ranges.append(detector.still_s)
+    assert ranges == [NEVER_S, (11.0, 11.0), NEVER_S, NEVER_S, (14.0, 14.0), (14.0, 15.0)]

@@ -97,6 +97,34 @@ def test_a_capture_contains_only_settled_frames_after_the_call(source, stream):
     assert [f.number for f in capture.result(WAIT_S)] == [2, 3]
 
 
+def test_a_capture_takes_the_newest_frames_of_the_still_scene_first(source):
+    """Who clicks and lifts the object at once loses nothing."""
+    stream = Stream(source, keeps_seen=True)
+    stream.start()
+    start = time.monotonic()
+    seen: queue.Queue[SourceFrame] = queue.Queue()
+    stream.add_tap(seen.put)
+    for number in range(6):
+        source.next.put(frame(number, settled=number != 1, time_s=start + 0.001 * (number + 1)))
+        seen.get(timeout=WAIT_S)
+    enough = stream.capture(2, (start, start + 0.0055))  # 0 to 4, without the lift
+    assert [f.number for f in enough.result(WAIT_S)] == [3, 4]
+    all_four = stream.capture(4, (start, start + 1.0))
+    assert [f.number for f in all_four.result(WAIT_S)] == [2, 3, 4, 5]
+    assert not stream.capture(5, (start, start + 1.0)).done()  # 0 was made before a change
+    more = stream.capture(3, (start + 0.0045, start + 0.0055))
+    assert not more.done()
+    for number in (6, 7):
+        source.next.put(frame(number))
+    assert [f.number for f in more.result(WAIT_S)] == [4, 6, 7]
+    stream.stop()
+    stream.start()
+    fresh = stream.capture(1, (start, time.monotonic()))  # another picture, perhaps
+    source.next.put(frame(0))
+    assert [f.number for f in fresh.result(WAIT_S)] == [0]
+    stream.stop()
+
+
 def test_a_capture_fails_when_the_stream_is_stopped(source):
     stream = Stream(source)
     with pytest.raises(SourceLost, match="stopped"):
