@@ -194,6 +194,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self._in_paint = True
         try:
             window.GetState().Reset()  # Qt has drawn since
+            self.scene.lay_axes()
             # The interactor would hold Python's lock while it draws, and every other thread.
             window.Render()
         finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -15,13 +16,14 @@ from pyvista.plotting import BasePlotter
 from vtkmodules.vtkCommonCore import VTK_FONT_FILE
 
 from app.program.display import DisplaySettings
-from app.widgets.units import length_text, round_length_mm
+from app.widgets.units import length_text, round_length_mm, round_up
 from gelpolight_core.base.arrays import Float64Array
 
 from .display_surface import PIN_NAMES, ColourScale, DisplaySurface, SurfaceLine, densify_line
 from .surface_mesh import SurfaceMesh
 
 Vector = tuple[float, float, float]
+Project: TypeAlias = Callable[[Float64Array], Float64Array]
 
 VIEWS: dict[str, tuple[Vector, Vector]] = {
     "isometric": ((-0.55, -1.0, 0.8), (0.0, 0.0, 1.0)),
@@ -156,60 +158,89 @@ def box_of(surface: DisplaySurface, exaggeration: float) -> Box:
     return left, right, near, far, exaggeration * min(low, 0.0), exaggeration * high
 
 
-def round_values(low: float, high: float, most: int) -> Float64Array:
-    """Return round values with equal steps inside a range, about `most` of them."""
-    step = round_length_mm((high - low) / most)
+def round_values(low: float, high: float, step: float) -> Float64Array:
+    """Return the multiples of a step inside a range."""
     first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
     return np.asarray(step * np.arange(first, last + 1))
 
 
-def draw_axes(
-    plotter: Plotter, box: Box, style: DisplaySettings, ink: SceneColours, depth_title: str
-) -> None:
-    """Draw axes with true values: the sensor's y, and depth, with its title, not exaggerated.
+AxesMarks = tuple[Float64Array, Float64Array, list[str]]
+# Room of a number with a gap, and the width of a letter, in sizes of a letter.
+NUMBER, LETTER = np.array([2.5, 1.25]), 0.6
 
-    Labels are upright, and one that would cover another one is left out.
-    """
+
+def draw_axes(plotter: Plotter, marks: AxesMarks | None, ink: SceneColours) -> None:
+    """Draw axes with upright labels. One that would cover another one is left out. None: none."""
     _remove(plotter, "axes", "axes-labels")
-    if not style.axes:
+    if marks is None:
         return
-    ends, points, texts = axes_marks(box, style.exaggeration, depth_title)
+    ends, points, texts = marks
     lines = pv.line_segments_from_points(ends)
     plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
-    centred = {"justification_horizontal": "center", "justification_vertical": "center"}
-    _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
+    if texts:
+        centred = {"justification_horizontal": "center", "justification_vertical": "center"}
+        _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
 
 
-def axes_marks(
-    box: Box, exaggeration: float, depth_title: str
-) -> tuple[Float64Array, Float64Array, list[str]]:
-    """Return the lines of the axes with their ticks, and the places and texts of the labels."""
-    left, right, near, far, low, high = box
-    x, y = round_values(left, right, 6), round_values(near, far, 6)
-    depth = round_values(low / exaggeration, high / exaggeration, 2)
-    z = exaggeration * depth
-    tick = 0.015 * (right - left)
-    # Start and end of each axis, direction of its ticks, places and values of these, title.
+def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project) -> AxesMarks:
+    """Return the lines of the axes with their ticks, and the places and texts of the labels.
+
+    The values are true: the sensor's y, and depth that is not exaggerated. Their steps follow from
+    the length of the axis as it is seen, so that numbers have room beside each other. An axis that
+    lies on a longer one, or is seen end-on, has none.
+
+    Parameters
+    ----------
+    box : Box
+        Its edges are the axes.
+    exaggeration : float
+        Factor on the depth.
+    depth_title : str
+        Title of the axis of the depth.
+    project : callable
+        Returns where points (N, 3) of the scene are seen (N, 2), in sizes of a letter.
+    """
+    left, right, near, far, low = box[:5]
+    width, depth, height = np.diff(np.reshape(box, (3, 2))) * np.eye(3)
+    foot = np.array([[left, near, low], [right, near, low], [left, far, low], [right, far, low]])
+    # x and y lie along the lower edges of the view, which the surface does not cover.
+    levels = project(foot)[:, 1].round(2).reshape(2, 2)
+    back, aside = (int(levels.sum(axis=k).argmin()) for k in (1, 0))
+    out_x, out_y, down = np.array([2 * aside - 1, 2 * back - 1, -1])[:, None] * np.eye(3)
+    scale = 1.0 / exaggeration
+    # Start and vector of each axis, sides for its labels, value of a place of 1, title.
     axes = (
-        ((left, near, low), (right, near, low), (0.0, -tick, 0.0), x, x, "x (mm)"),
-        ((left, near, low), (left, far, low), (-tick, 0.0, 0.0), y, -y, "y (mm)"),
-        ((right, near, low), (right, near, high), (tick, 0.0, 0.0), z, depth, depth_title),
+        (foot[2 * back], width, np.array([out_y, down]), 1.0, "x (mm)"),
+        (foot[aside], depth, np.array([out_x, down]), -1.0, "y (mm)"),
+        (foot[2 * back + 1 - aside], height, np.array([-out_x, out_y]), scale, depth_title),
     )
-    ends, points, texts = list[Float64Array](), list[Float64Array](), list[str]()
-    for number, (first, last, out, places, values, title) in enumerate(axes):
-        start, end, outward = np.array(first), np.array(last), np.array(out)
-        ends += [start, end]
-        # Beside the numbers, but above the depth axis, which may be short.
-        above = end + np.array([0.0, 0.0, 4.0 * tick])
-        points.append(above if number == 2 else 0.5 * (start + end) + 6.0 * outward)
-        texts.append(title)
-        for place, value in zip(places, values, strict=True):
-            at = start.copy()
-            at[number] = place
-            ends += [at, at + outward]
-            points.append(at + 3.0 * outward)
-            texts.append(f"{value + 0.0:.4g}")
-    return np.array(ends), np.array(points), texts
+    ends = np.concatenate([[start, start + axis] for start, axis, *_ in axes])
+    ticks, points, texts = [ends], list[Float64Array](), list[str]()
+    seen = np.diff(project(ends).reshape(3, 2, 2), axis=1)[:, 0]
+    lengths = np.maximum(np.hypot(*seen.T), 1e-9)  # 0 end-on
+    for number, (start, axis, sides, value, title) in enumerate(axes):
+        along, named = seen[number], np.array([LETTER * len(title), NUMBER[1]])
+        across, longer = along[::-1] * (-1.0, 1.0) / lengths[number], lengths > lengths[number]
+        lowest, highest = sorted(value * ends[2 * number : 2 * number + 2, number])
+        with np.errstate(divide="ignore"):  # upright or level
+            apart, above = np.min([NUMBER, 0.5 * (NUMBER + named)] / np.abs(along), axis=1)
+        step = round_up(apart * (highest - lowest))
+        away = lengths[number] * np.abs(seen @ across)[longer] / lengths[longer]
+        if not 0.0 < step <= highest - lowest or (away < NUMBER[1]).any():
+            continue
+        # Numbers and title are two bands beside the axis, on the side that is seen longest.
+        middle = start + 0.5 * axis
+        reach = np.abs((project(middle + sides) - project(middle[None])) @ across)
+        out = sides[reach.argmax()] / reach.max()
+        tall, taller = (0.5 * np.abs(across) @ room for room in (NUMBER, named))
+        amounts = round_values(lowest, highest, step)
+        at = np.where(np.eye(3)[number], amounts[:, None] / value, start)
+        ticks += [np.hstack([at, at + 0.5 * tall * out]).reshape(-1, 3)]
+        beside = middle + (2.5 * tall + taller) * out
+        titled = start + (1.0 + above) * axis if number == 2 else beside  # it may be short
+        points += [*(at + 1.5 * tall * out), titled]
+        texts += [*(f"{amount + 0.0:.4g}" for amount in amounts), title]
+    return np.concatenate(ticks), np.array(points).reshape(-1, 3), texts
 
 
 def draw_scale(

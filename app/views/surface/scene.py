@@ -21,6 +21,7 @@ from .overlays import (
     CURSOR,
     CUT,
     VIEWS,
+    AxesMarks,
     Box,
     OverlayActor,
     Plotter,
@@ -78,6 +79,7 @@ class Scene:
         self._pins: tuple[tuple[PointXY, ...], str] = ((), "")
         self._solid: pv.PolyData | None = None
         self._explained: object = None
+        self._laid: object = None
         self._line = OverlayActor(plotter, "lines", line_width=3)
         self._cut = OverlayActor(plotter, "cut", color=CUT, line_width=3)
         self._dot = OverlayActor(
@@ -133,14 +135,29 @@ class Scene:
         scale = surface.scale.in_unit()
         colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
         # By the extent, not the nodes: those of a live and a frozen frame differ.
-        explained = (surface.extent_mm, surface.range_mm, surface.axis, colours, style, self._ink)
+        explained = (surface.extent_mm, surface.range_mm, colours, style, self._ink)
         if explained == self._explained:
             return
         self._explained, self.box = explained, box_of(surface, style.exaggeration)
-        draw_axes(self._plotter, self.box, style, self._ink, surface.axis)
         draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
         draw_note(self._plotter, style, self._ink, curved=surface.curved)
         draw_scale_bar(self._plotter, self.box, style, self._ink)
+
+    def lay_axes(self) -> None:
+        """Place the axes and their numbers for the present camera, before it is drawn."""
+        marks = self._marks() if self.style.axes else None
+        laid = self._ink, marks and (marks[0].tobytes(), marks[2])
+        if laid != self._laid:
+            self._laid = laid
+            draw_axes(self._plotter, marks, self._ink)
+
+    def _marks(self) -> AxesMarks | None:
+        if self.surface is None or not self.box:
+            return None
+        letter_px = (self._ink.font + 1) * self._plotter.render_window.GetDPI() / 72.0
+        letters = 0.5 * self._size / letter_px
+        how = self.style.exaggeration, self.surface.axis
+        return axes_marks(self.box, *how, lambda points: letters * self._project(points))
 
     # Overlays on the surface
 
@@ -209,15 +226,9 @@ class Scene:
             return
         ends = surface.x_mm[:, [0, -1]].ravel()
         rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)]).astype(np.float64)
-        points: Float64Array = np.vstack(
-            [np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]]
-        )
-        if self.style.axes:
-            points = np.vstack([points, axes_marks(self.box, self.style.exaggeration, "")[1]])
-        points = np.insert(points, 3, 1.0, axis=1)
+        points = np.vstack([np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]])
         self._plotter.renderer.reset_camera(render=False, bounds=self.box)
-        size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
-        filled = np.clip(1.0 - 2.0 * MARGIN_PX / size, 0.4, 0.95)
+        filled = np.clip(1.0 - 2.0 * MARGIN_PX / self._size, 0.4, 0.95)
         # VTK fits a sphere around the box. The rim of the surface fits closer; as moving and
         # zooming change the perspective, twice.
         for _ in range(2):
@@ -226,14 +237,25 @@ class Scene:
             low, high = self._seen(points)
             self.zoom(float(min(filled / (0.5 * (high - low)))))
 
-    def _seen(self, points: Float64Array) -> tuple[Float64Array, Float64Array]:
-        """Return where points (N, 4) of the scene begin and end in the window, -1 to 1."""
+    @property
+    def _size(self) -> Float64Array:
+        return np.maximum(np.asarray(self._plotter.window_size, np.float64), 1.0)  # 0 if unshown
+
+    def _project(self, points: Float64Array) -> Float64Array:
+        """Return where points (N, 3) of the scene are in the window, -1 to 1."""
         renderer, camera = self._plotter.renderer, self._plotter.camera
-        matrix = pv.array_from_vtkmatrix(
+        matrix: Float64Array = pv.array_from_vtkmatrix(
             camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
         )
-        clip = points @ matrix.T
-        shares = clip[:, :2] / clip[:, 3:]
+        clip = np.insert(points, 3, 1.0, axis=1) @ matrix.T
+        shares: Float64Array = clip[:, :2] / clip[:, 3:]
+        return shares
+
+    def _seen(self, points: Float64Array) -> tuple[Float64Array, Float64Array]:
+        """Return where points and the labels of the axes begin and end in the window."""
+        if self.style.axes and (marks := self._marks()) is not None:
+            points = np.vstack([points, marks[1]])
+        shares = self._project(points)
         return shares.min(axis=0), shares.max(axis=0)
 
     def _pan(self, by: Float64Array) -> None:
@@ -303,6 +325,7 @@ class OffscreenScene:
         """Return the image, (height, width, 3), or 4 channels with a transparent background."""
         if transparent:
             self._plotter.renderer.GradientBackgroundOff()  # a gradient would stay opaque
+        self.scene.lay_axes()
         self._plotter.render()
         return np.asarray(
             self._plotter.screenshot(None, transparent_background=transparent, return_img=True)

@@ -16,7 +16,7 @@ from shiboken6 import getAllValidWrappers
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
 from app.views.map.colour_tables import colour_table
-from app.views.surface.overlays import FONT, VIEWS, axes_marks
+from app.views.surface.overlays import FONT, VIEWS
 from app.views.surface.panel import SurfacePanel
 from app.widgets.layout import hbox
 from tests.app.views.surface.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
@@ -133,10 +133,10 @@ def test_a_curved_membrane_is_not_stretched_and_all_axes_are_in_the_window(panel
     scene = panel.view.scene  # type: ignore[union-attr]
     panel.show_surface(replace(made(), curved=True, range_mm=(-2.0, 1.0)))
     assert scene.box[4:] == pytest.approx((-2.0, 1.0)) and scene.style.exaggeration == 1.0
-    ends, points, _ = axes_marks(scene.box, 1.0, "title")
-    assert ends[:, 2].min() == ends[0, 2] == scene.box[4]  # x and y lie below the membrane
     panel.view_from("isometric")
-    low, high = scene._seen(np.insert(points, 3, 1.0, axis=1))
+    ends, points, _ = scene._marks()  # type: ignore[misc]
+    assert ends[:4, 2].max() == scene.box[4]  # x and y lie below the membrane
+    low, high = scene._seen(points)
     assert (low > -1.0).all() and (high < 1.0).all()
     panel.show_surface(made())
     assert scene.style.exaggeration == 5.0 and scene.box[5] == pytest.approx(5.0)
@@ -145,13 +145,14 @@ def test_a_curved_membrane_is_not_stretched_and_all_axes_are_in_the_window(panel
 @pytest.mark.function("Exaggerate the depth while the axes stay true")
 def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(panel, qtbot):
     panel.display.change(exaggeration=5.0)
-    box = panel.view.scene.box  # type: ignore[union-attr]
-    assert box[5] == pytest.approx(5.0)
-    _, points, texts = axes_marks(box, 5.0, "depth (mm)")
+    scene = panel.view.scene  # type: ignore[union-attr]
+    assert scene.box[5] == pytest.approx(5.0)
+    panel.view_from("isometric")
+    _, points, texts = scene._marks()  # type: ignore[misc]
     titles = [texts.index(f"{name} (mm)") for name in ("x", "y", "depth")]
     x, y, depth = (
         [(float(texts[n]), points[n, axis]) for n in range(first + 1, last)]
-        for axis, (first, last) in enumerate(itertools.pairwise([*titles, len(texts)]))
+        for axis, (first, last) in enumerate(itertools.pairwise([-1, *titles]))
     )
     assert x and all(value == pytest.approx(place) for value, place in x)
     assert y and all(value == pytest.approx(-place) for value, place in y), "y points down"
