@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import linecache
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -268,6 +269,7 @@ class MainWindow(QMainWindow):
         show_in_use(self.context)
 
     def _give_back(self) -> None:
+        linecache.clearcache()  # PySide6 reads the source of every imported module: 50 MB
         trim_malloc_cache()
         self._tidy.start(TIDY_AGAIN_MS)
 
