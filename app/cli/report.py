@@ -33,8 +33,7 @@ class ReportCommand(Command):
     )
     output: Path = output("FILE.pdf")
     presses: Path | None = option(
-        "folder of presses with truth.csv, or of their session, for validation",
-        metavar="PRESSES",
+        "folder of presses with truth.csv, or of their session, for validation", metavar="PRESSES"
     )
     tolerance: tuple[float, float] | None = tolerance()
     model: str | None = option(
@@ -72,4 +71,4 @@ class ReportCommand(Command):
             progress("report", 1.0)
             report = calibration_report(calibration, run, validation=validation)
         write_report(report, self.output)
-        print_safe(f"Report saved to {self.output}: {report.verdict.value}")
+        print_safe(f"Report saved to {self.output}: {report.verdict}")

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from gelpolight_core.base.compared_quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
-from gelpolight_core.base.finding import QualityTable, Verdict, worst_of
+from gelpolight_core.base.finding import QualityTable
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import MeasuredPress, compare_with_truth
@@ -61,15 +61,13 @@ def measurement_report(
     )
     validation = stated_validation(calibration)
     figures = [figure for section in sections for figure in section.quality.figures]
+    # Without a reference there is nothing to decide.
     judged = any(figure.key == "deviation" for figure in figures)
-    worst = worst_of(figures)
-    # Without a reference there is nothing to pass.
-    default = Verdict.PASS if judged else Verdict.WARN
     measured = ("Measured", f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
     of_calibration = ("Verdict of the calibration", calibration.verdict.word)
     return Report(
         title=f"Measurement with sensor {calibration.serial}",
-        verdict=default if worst is None else worst.verdict,
+        verdict=QualityTable(tuple(figures)).verdict if judged else None,
         sections=sections,
         cause="" if judged else "No decision: no true value of a measured quantity is stated",
         facts=(measured, *head_facts(calibration), of_calibration),

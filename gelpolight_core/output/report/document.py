@@ -143,8 +143,8 @@ class Report:
     ----------
     title : str
         Heading.
-    verdict : Verdict
-        Verdict on all of it.
+    verdict : Verdict or None
+        Verdict on all of it. None: there was nothing to decide.
     sections : tuple of ReportSection
         In their order.
     cause : str
@@ -162,7 +162,7 @@ class Report:
     """
 
     title: str
-    verdict: Verdict
+    verdict: Verdict | None
     sections: tuple[ReportSection, ...]
     cause: str = ""
     facts: Facts = ()

@@ -1,5 +1,6 @@
 """The report is complete, printable, and readable by programs."""
 
+import re
 import subprocess
 from dataclasses import replace
 from functools import cache
@@ -24,7 +25,7 @@ from gelpolight_core.calibration.reflectance_edit import with_edited_curves
 from gelpolight_core.measurement.result import MeasuredPress, Measurement
 from gelpolight_core.output.report.calibration_report import calibration_report
 from gelpolight_core.output.report.certificate import measurement_report
-from gelpolight_core.output.report.document import Report
+from gelpolight_core.output.report.document import Report, TextTable
 from gelpolight_core.output.report.facts import head_facts, stage_facts
 from gelpolight_core.output.report.report_pdf_file import report_pdf, write_report
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -119,15 +120,15 @@ def test_a_report_says_which_terms_held_out_presses_ask_for(small_calibration):
         full,
         membrane=replace(full.membrane, terms=terms),
         membrane_sd={**full.membrane_sd, "stretch_loss": 0.01},
-        evidence={"stretch": (83.0, 9.1), "lobe": (-0.2, 0.6)},
+        worth={"stretch": 0.0234, "lobe": 0.0002},
     )
     facts = facts_of_terms(small_calibration.changed(full=changed))
     name_by_key = {term.key: term.name.lower() for term in TERMS}
     stretch, lobe = (facts[name_by_key[key]] for key in ("stretch", "lobe"))
-    assert "0.12" in stretch and "83" in stretch and "9.1" in stretch
-    assert "not clearly needed" in lobe and "rises by 0.2" in lobe
+    assert "0.12" in stretch and "2.3 %" in stretch and "0.01" in stretch
+    assert "left out" in lobe and "< 0.1 %" in lobe
     # A calibration by an earlier program has none of this.
-    assert not facts_of_terms(small_calibration.changed(full=replace(full, evidence={})))
+    assert not facts_of_terms(small_calibration.changed(full=replace(full, worth={})))
 
 
 def facts_of_terms(c: Calibration) -> dict[str, str]:
@@ -200,8 +201,8 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(value, warn, gap, highe
     assert figure.limit_text.startswith(sign)
 
 
-@pytest.mark.parametrize(("size_mm", "verdict"), [(0.0, "warn"), (2.0, "pass")])
-def test_a_certificate_passes_only_what_was_compared(size_mm, verdict):
+@pytest.mark.parametrize(("size_mm", "verdict"), [(0.0, None), (2.0, "pass")])
+def test_a_certificate_passes_only_what_was_compared(size_mm, verdict, tmp_path):
     axis, flat = np.arange(-4.0, 5.0), np.zeros((9, 9), np.float32)
     heightmap = HeightMap(
         flat, axis, axis, 1.0, None, flat.astype(np.uint8), "A-1", "full", "p.png"
@@ -217,6 +218,22 @@ def test_a_certificate_passes_only_what_was_compared(size_mm, verdict):
     assert (report.verdict, bool(report.cause)) == (verdict, not size_mm)
     assert dict(report.facts)["Verdict of the calibration"] == small().verdict.word
     assert dict(report.sections[0].facts)["SHA-256 of the image"] == "ab"
+    path = written(report, tmp_path)
+    assert report_data(path)["verdict"] == verdict
+    badge = "\N{CHECK MARK} Pass" if verdict else "No decision"
+    assert report_text(path).startswith(f"{report.title} {badge}")
+
+
+def test_a_long_name_stays_in_its_column(tmp_path):
+    columns = 11
+    rows = tuple(("cylinder_s500_h100_same_1.png", *["0.0000"] * (columns - 1)) for _ in range(3))
+    listing = TextTable("Every press", tuple(f"deviation {k}" for k in range(columns)), rows)
+    path = written(Report("R", Verdict.PASS, (), listings=(listing,)), tmp_path)
+    boxes = subprocess.check_output(["pdftotext", "-bbox", str(path), "-"], text=True)
+    words = re.findall(r'xMin="([\d.]+)" yMin="[\d.]+" xMax="([\d.]+)".*?>(.*)</word>', boxes)
+    left_of_numbers = min(float(left) for left, _, word in words if word == "0.0000")
+    names = [float(right) for _, right, word in words if word.replace("\u200b", "").endswith("png")]
+    assert len(names) == len(rows) and max(names) < left_of_numbers
 
 
 def test_the_same_report_gives_the_same_file():
