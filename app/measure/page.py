@@ -243,7 +243,8 @@ class MeasurePage(QWidget):
             self.press_view.inspector.remarks.change(note="")
             self.press_view.inspector.show_message(text, "pass", link="Show records")
 
-        self.book.add(record, done)
+        image = self.press_view.work.image
+        self.book.add(record, done, None if image is None else image.frame)
 
     def _show_count(self) -> None:
         count = len(self.book.records)

@@ -11,8 +11,8 @@ from gelpolight_core.base.finding import Verdict
 from gelpolight_core.lab.measurement_record import DOUBTFUL, FILE, STORED, MeasurementRecord
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 
-_FIGURES = "Size or figure", "Error", "Depth", "Error"
-TITLES = ("Date", "Sensor", "Object", *_FIGURES, "Verdict", "Operator", "Note", "Image")
+_FIGURES = "Size or figure", "Error", "Height", "Height error"
+TITLES = ("Date", "Sensor", "Object", "Verdict", *_FIGURES, "Operator", "Note", "Image")
 NOTE, IMAGE = 9, 10
 """Columns."""
 EVALUATION = "evaluation"
@@ -60,9 +60,9 @@ def record_cells(record: MeasurementRecord) -> tuple[TableCell, ...]:
         TableCell(time, key=record.time.timestamp()),
         TableCell(record.serial),
         TableCell(shape_label(record.shape), _shape_icon(record.shape)),
+        TableCell(word, role, role),
         *_figure_cells(record.quantities[0], doubtful=doubtful),
         *_figure_cells(_depth(record), doubtful=doubtful),
-        TableCell(word, role, role),
         *map(TableCell, (record.operator, record.note, record.picture)),
     )
     return tuple(replace(cell, tip=_tip(record)) for cell in cells)

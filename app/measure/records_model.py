@@ -13,13 +13,15 @@ from PySide6.QtGui import QUndoStack
 
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
+from app.sources.source import SourceFrame
 from app.widgets.actions import UndoStep
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.store import Store
-from gelpolight_core.lab.measurement_record import MeasurementRecord
+from gelpolight_core.lab.measurement_record import FILE, MeasurementRecord
 from gelpolight_core.lab.measurement_store import NAME
 
 RecordEdit = Callable[[Store], object]
+Done = Callable[[int], object]
 
 
 class RecordsModel(QObject):
@@ -74,11 +76,20 @@ class RecordsModel(QObject):
         if self._folder not in (None, self._context.workspace.folder):
             self.refresh()
 
-    def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Save a measurement once. `done` is called with its number when it is on disk."""
+    def add(self, record: MeasurementRecord, done: Done, live: SourceFrame | None = None) -> None:
+        """Save a measurement once. `done` is called with its number when it is on disk.
+
+        The image of a camera becomes a file of the workspace. Recordings and folders have theirs.
+        """
 
         def save(store: Store) -> int:
-            return number_of(record, store.all(MeasurementRecord)) or store.add(record)
+            return number_of(record, store.all(MeasurementRecord)) or store.add(with_image())
+
+        def with_image() -> MeasurementRecord:
+            if live is None or live.index is not None:
+                return record
+            file = self._context.workspace.keep_image(live.rgb, record.serial)
+            return replace(record, settings={**record.settings, FILE: str(file)})
 
         self.change("Saving the measurement", save, done)
 
@@ -92,12 +103,11 @@ class RecordsModel(QObject):
 
     def write_note(self, record: MeasurementRecord, note: str) -> None:
         """Change the note of a measurement. This can be undone."""
-        if note != record.note:
-            self._push(
-                "edit a note",
-                lambda records: records.change(replace(record, note=note)),
-                lambda records: records.change(record),
-            )
+        self._push(
+            "edit a note",
+            lambda records: records.change(replace(record, note=note)),
+            lambda records: records.change(record),
+        )
 
     def _push(self, text: str, redo: RecordEdit, undo: RecordEdit) -> None:
         change = partial(self.change, "Changing the records")
@@ -107,9 +117,7 @@ class RecordsModel(QObject):
         """Finish the work in progress."""
         self._jobs.close()
 
-    def change(
-        self, title: str, change: RecordEdit, done: Callable[[int], object] | None = None
-    ) -> None:
+    def change(self, title: str, change: RecordEdit, done: Done | None = None) -> None:
         """Change the records in the background. `done` is called with what `change` returns."""
         workspace = self._context.workspace
         folder = workspace.folder

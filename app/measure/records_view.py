@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QStackedWidget, QWidget
+from PySide6.QtCore import QLocale, Qt
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QWidget
 
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_save
@@ -17,7 +18,7 @@ from app.widgets.cells_table import CellsTable
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.text_roles import named_label
+from app.widgets.text_roles import named_label, stack_over_text
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries, TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.compared_quantity import Quantity, unit_behind
@@ -59,14 +60,13 @@ class RecordsView(QWidget):
         self.export_action = make_action(
             self, "records.export", "Records as CSV…", export, icon_name="copy", tip=tip
         )
+        remove, tip, keys = self.remove_selected, "Delete measurements", ("Delete",)
         self.remove = make_action(
-            self,
-            "records.delete",
-            "Delete",
-            self.remove_selected,
-            keys=("Delete",),
-            icon_name="remove",
-            tip="Delete measurements",
+            self, "records.delete", "Delete", remove, keys=keys, icon_name="remove", tip=tip
+        )
+        tip = "Open its image on Measure, to measure again or to write its certificate"
+        self.open_action = make_action(
+            self, "records.open", "Open image", self._open, icon_name="picture", tip=tip
         )
         self._offer = ""
         undo_actions(self, "records", book.undo, ("Undo in the records", "Redo in the records"))
@@ -92,7 +92,7 @@ class RecordsView(QWidget):
             "Measurements",
             TITLES,
             record_cells,
-            lambda record: record.id,
+            attrgetter("id"),
             editable=NOTE,
         )
         table.edited.connect(self._book.write_note)
@@ -106,6 +106,7 @@ class RecordsView(QWidget):
         header.setSectionResizeMode(IMAGE, QHeaderView.ResizeMode.Interactive)
         header.resizeSection(IMAGE, IMAGE_WIDTH)
         table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
+        table.addActions([self.open_action, self.export_action, self.remove])
         return table
 
     def _lay_out(self) -> None:
@@ -115,13 +116,10 @@ class RecordsView(QWidget):
         across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
         below = splitter(across, (self.statistics, 0), (right, 0), sizes=(470, 700))
         split = splitter(down, (self.table, 0), (below, 0), sizes=(420, 260))
-        empty = PlainLabel("No records yet. Measure a press and save it to the records.")
-        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.stack = QStackedWidget()
-        self.stack.addWidget(set_names(empty, "measure.results.empty", "No records"))
-        self.stack.addWidget(split)
+        empty = "No records yet. Measure a press and save it to the records."
+        self.stack = stack_over_text("measure.results.empty", empty, split)
         filters = PlainLabel("Sensor"), self.sensor, PlainLabel("Object"), self.shape
-        buttons = action_button(self.remove), action_button(self.export_action)
+        buttons = map(action_button, (self.open_action, self.remove, self.export_action))
         bar = hbox(*filters, self.count, (self.message, 1), *buttons, spacing=8)
         vbox(bar, (self.stack, 1), of=self, margins=(16, 8, 16, 8), spacing=8)
 
@@ -161,7 +159,8 @@ class RecordsView(QWidget):
 
     def _describe(self) -> None:
         group = self.group()
-        self.remove.setEnabled(bool(self.table.selected))
+        for action in (self.remove, self.open_action):
+            action.setEnabled(bool(self.table.selected))
         self.statistics.setText(_statistics_text(group))
         serial = group[0].serial if group else ""
         records = tuple(r for r in self.table.shown if r.serial == serial)
@@ -184,7 +183,7 @@ class RecordsView(QWidget):
             if toast.text == self._offer:
                 toast.dismiss()
 
-    def _open(self, column: int) -> None:
+    def _open(self, column: int = IMAGE) -> None:
         """Measure again on the image of the selected record. A note is edited instead."""
         record = self.table.chosen()
         if record is None or column == NOTE:
@@ -197,8 +196,9 @@ class RecordsView(QWidget):
 
     def choose_export(self) -> None:
         """Let the user choose the file of the table."""
-        settings, title = self._context.settings, "Export as CSV"
-        path = ask_save(self, settings, "table", title, "measurements.csv", "Tables (*.csv)")
+        settings, sign = self._context.settings, "comma" if has_decimal_comma() else "point"
+        title, patterns = "Export as CSV", f"Tables with a decimal {sign} (*.csv)"
+        path = ask_save(self, settings, "table", title, "measurements.csv", patterns)
         if path is not None:
             self.export_to(path)
 
@@ -209,9 +209,14 @@ class RecordsView(QWidget):
         self.message.setText("Writing the table")
         self._book.change(
             "Writing the table",
-            lambda _store: write_csv(records, path),
+            lambda _store: write_csv(records, path, comma=has_decimal_comma()),
             lambda _: self.message.setText(saved),
         )
+
+
+def has_decimal_comma() -> bool:
+    """Whether the system's spreadsheets read a decimal comma."""
+    return QLocale.system().decimalPoint() == ","
 
 
 def errors_over_time(

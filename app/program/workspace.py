@@ -6,6 +6,7 @@
     sensors/SERIAL/NAME.gplcal           calibrations
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
+    sensors/SERIAL/measured/TIME.png     live images of saved measurements
     records.sqlite                       measurements
 """
 
@@ -24,6 +25,7 @@ import platformdirs
 
 from gelpolight_core.base.atomic_write import (
     NameTakenError,
+    cannot_write,
     make_folder,
     write_atomically,
     write_json,
@@ -78,6 +80,7 @@ def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
 
 
 if TYPE_CHECKING:
+    from gelpolight_core.base.arrays import FrameArray
     from gelpolight_core.base.store import Store
     from gelpolight_core.sensor.sensor_calibration import Calibration
 
@@ -171,10 +174,25 @@ class Workspace:
         """Return a path for a new recording, named after the time. Its folder is created."""
         from gelpolight_core.output.recording.recording_format import ENDING
 
-        folder = self.sensor_folder(serial) / "recordings"
-        make_folder(folder)
-        stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
-        return unused_path(folder / f"{stamp}{ENDING}")
+        return self._dated_path(serial, "recordings", ENDING)
+
+    def keep_image(self, rgb: FrameArray, serial: str) -> Path:
+        """Write the live image of a saved measurement, named after the time. Return its path.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        from gelpolight_core.session.session_images import write_image
+
+        path = self._dated_path(serial, "measured", ".png")
+        return write_new(path, partial(write_image, rgb, new=True))
+
+    def _dated_path(self, serial: str, folder: str, ending: str) -> Path:
+        parent = self.sensor_folder(serial) / folder
+        make_folder(parent)
+        return unused_path(parent / f"{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}{ending}")
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return the path of a new calibration. Its folder is created."""
@@ -313,6 +331,28 @@ class Workspace:
                 raise
         return target
 
+    def rename(self, path: Path, name: str) -> Path:
+        """Rename a calibration, and a validation beside it. Their content stays. Return its path.
+
+        Raises
+        ------
+        InputError
+            If it is outside the workspace, another one has the name, or the system refuses it.
+        """
+        self._refuse_outside(path)
+        target, is_used = path.with_name(f"{folder_name(name)}{ENDING}"), self.in_use == path
+        if target.exists():
+            raise NameTakenError("A calibration has this name already", target, Remedy.CHOOSE_NAME)
+        try:
+            for file, renamed in zip(_files(path), _files(target), strict=True):
+                if file.exists():
+                    file.replace(renamed)
+        except OSError as error:
+            raise cannot_write(error, target) from error
+        if is_used:
+            self.use(target)
+        return target
+
     def remove(self, path: Path, discard: Callable[[Path], bool]) -> None:
         """Move a calibration, and a validation beside it, to the trash of the system.
 
@@ -329,13 +369,13 @@ class Workspace:
             If it is outside the workspace, or the system has no trash for it: it stays.
         """
         self._refuse_outside(path)
-        refuse_unlisted(path)
-        was_in_use, validation = self.in_use == path, validation_path(path)
-        _discard(path, discard)
+        was_in_use = self.in_use == path
+        for file in filter(Path.exists, _files(path)):
+            if not discard(file):
+                message = "The system has no trash for this file, so it was not deleted"
+                raise InputError(message, file, "Delete it in the file manager")
         if was_in_use:
             self.use(None)
-        if validation.exists():
-            _discard(validation, discard)
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
@@ -347,10 +387,10 @@ class Workspace:
             raise InputError(message, self.folder, Remedy.CHECK_DISK) from error
 
     def _refuse_outside(self, path: Path) -> None:
+        refuse_unlisted(path)
         if not path.is_relative_to(self.sensors_folder):
-            raise InputError(
-                "The calibration is not in the library", path, Remedy.IMPORT_CALIBRATION
-            )
+            text = "The calibration is not in the library"
+            raise InputError(text, path, Remedy.IMPORT_CALIBRATION)
 
 
 def default_folder() -> Path:
@@ -369,7 +409,6 @@ def folder_name(text: str) -> str:
     return name or "unnamed"
 
 
-def _discard(file: Path, discard: Callable[[Path], bool]) -> None:
-    if not discard(file):
-        message = "The system has no trash for this file, so it was not deleted"
-        raise InputError(message, file, "Delete it in the file manager")
+def _files(calibration: Path) -> tuple[Path, Path]:
+    """Return the file of a calibration, and that of a validation beside it."""
+    return calibration, validation_path(calibration)

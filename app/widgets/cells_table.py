@@ -115,13 +115,16 @@ class CellsModel(QAbstractTableModel):
         return flags | Qt.ItemFlag.ItemIsEditable if index.column() == self._editable else flags
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
-        """Report an entered text. The owner of the data shows it."""
-        self.edited.emit(index.row(), str(value))
+        """Report another text. The owner of the data shows it."""
+        if value != self._cells[index.row()][index.column()].text:
+            self.edited.emit(index.row(), str(value))
         return True
 
 
 class CellsTable(QTableView, Generic[ItemT]):
     """Shows items, which can be selected. A click on a column header sorts them.
+
+    Its actions are its context menu.
 
     Parameters
     ----------
@@ -171,6 +174,7 @@ class CellsTable(QTableView, Generic[ItemT]):
         self.setShowGrid(False)
         self.setWordWrap(False)
         self.setTabKeyNavigation(False)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(30)
         header = self.horizontalHeader()

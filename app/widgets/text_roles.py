@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from .label import PlainLabel
 from .widget_names import set_names
@@ -83,3 +84,13 @@ def named_label(
     if role:  # a style sheet that is applied for nothing would take the font back later
         set_text_role(label, role)
     return label
+
+
+def stack_over_text(name: str, text: str, widget: QWidget) -> QStackedWidget:
+    """Return a stack of a centred text, shown as long as there is nothing, and a widget."""
+    label = named_label(name, text, text=text)
+    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    stack = QStackedWidget()
+    stack.addWidget(label)
+    stack.addWidget(widget)
+    return stack

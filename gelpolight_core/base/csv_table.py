@@ -11,12 +11,15 @@ from .errors import InputError, Remedy
 from .safe_reading import TEXT_LIMIT, read_file, short_repr
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """Return a table as CSV with a line of column names, None as an empty cell."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
+def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]], comma: bool = False) -> str:
+    """Return a table as CSV with a line of column names, None as an empty cell.
+
+    With a decimal comma, semicolons separate the cells.
+    """
+    text, (decimal, separator) = io.StringIO(), (",", ";") if comma else (".", ",")
+    writer = csv.writer(text, delimiter=separator, lineterminator="\n")
+    for row in (columns, *rows):
+        writer.writerow(str(x).replace(".", decimal) if isinstance(x, float) else x for x in row)
     return text.getvalue()
 
 

@@ -108,8 +108,8 @@ def _safe(text: str) -> str:
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
-def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
-    """Write the table, completely or not at all.
+def write_csv(records: Sequence[MeasurementRecord], path: Path, *, comma: bool = False) -> None:
+    """Write the table, completely or not at all, for spreadsheets with a decimal comma or point.
 
     Raises
     ------
@@ -117,5 +117,5 @@ def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
         If the file cannot be written.
     """
     # The byte order mark tells spreadsheets that the file is UTF-8.
-    text = csv_text(COLUMNS, rows_of(records)).encode("utf-8-sig")
+    text = csv_text(COLUMNS, rows_of(records), comma=comma).encode("utf-8-sig")
     write_atomically(path, lambda stream: stream.write(text))

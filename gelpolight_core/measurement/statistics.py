@@ -50,8 +50,8 @@ class Statistics:
 
     @property
     def spread(self) -> float:
-        """Largest minus smallest."""
-        return self.highest - self.lowest
+        """Largest minus smallest. One value has none."""
+        return self.highest - self.lowest if self.count > 1 else math.nan
 
     @property
     def missing(self) -> int:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gelpolight_core.base import store
 from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.csv_table import read_csv
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.store import Entry
 from gelpolight_core.lab.measurement_record import MeasurementRecord
@@ -98,6 +99,7 @@ def test_statistics_of_repeated_measurements():
     assert found.mean == pytest.approx(np.mean(heights))
     assert found.sd == pytest.approx(np.std(heights, ddof=1))
     assert found.spread == pytest.approx(0.06)
+    assert np.isnan(statistics_of([1.00]).spread), "one value has none"
 
 
 def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100():
@@ -117,6 +119,22 @@ def test_the_table_opens_in_a_spreadsheet(records, tmp_path):
     assert float(rows[1]["error_percent"]) == pytest.approx(4.0)
     assert float(rows[1]["error"]) == pytest.approx(0.04)
     assert rows[0]["time_utc"] == "2026-03-01 12:00:00"
+
+
+NUMBERS = "value", "sd", "truth", "error", "error_percent", "limit_percent", "truth_sd", "en"
+
+
+def test_a_table_with_a_decimal_comma_holds_the_same_numbers(records, tmp_path):
+    records.add(replace(cylinder(1.04), note="3.5 N; held"))
+    tables = []
+    for comma in (False, True):
+        write_csv(records.all(MeasurementRecord), tmp_path / "a.csv", comma=comma)
+        tables.append([cells for _, cells in read_csv(tmp_path / "a.csv")])
+    columns = tables[0][0]
+    for point, comma in zip(tables[0][1:], tables[1][1:], strict=True):
+        for name, one, other in zip(columns, point, comma, strict=True):
+            assert other == (one.replace(".", ",") if name in NUMBERS else one)
+    assert tables[1][1][columns.index("error_percent")].count(",") == 1
 
 
 def test_removed_measurements_are_restored_and_notes_change(records):

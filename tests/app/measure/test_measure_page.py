@@ -11,17 +11,21 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 import pytest
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QEvent, QLocale, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QAction, QDropEvent
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 from report_pdf import report_data
 
 from app.cli.main import main
 from app.live.tool_layer import tool_handles
 from app.measure.page import MeasurePage
+from app.measure.record_table import TITLES
 from app.program.context import AppContext
 from app.program.preferences import WarningLimits, settings_file
+from app.sources.source import SourceFrame
 from gelpolight_core.base.compared_quantity import Quantity
+from gelpolight_core.base.csv_table import read_csv
 from gelpolight_core.base.store import Store
 from gelpolight_core.calibration.calibration_file import write_calibration
 from gelpolight_core.lab.measurement_record import MeasurementRecord
@@ -487,6 +491,51 @@ def test_a_recording_can_be_measured_frame_by_frame(
     assert not press_view.map.map.has_image
     press_view.release()
     assert press_view.map.map._words.text() == "No depth yet."
+
+
+def test_a_live_image_is_kept_with_its_measurement_but_not_one_that_is_a_file_already(
+    page, context, qtbot
+):
+    rgb = np.random.default_rng(3).integers(0, 256, (24, 32, 3), np.uint8)
+    live, replayed = SourceFrame(rgb, 7, 1.0), SourceFrame(rgb, 7, 1.0, index=7)
+    for count, frame in enumerate((live, replayed), 1):
+        measured = (Quantity("distance_mm", 9.0 + count),)
+        page.book.add(MeasurementRecord("A-1", "", "distance", measured), int, frame)
+        _kept(page, qtbot, count)
+    files = [record.settings.get("file", "") for record in page.book.records]
+    assert files[1] == ""
+    assert np.array_equal(cv2.imread(files[0])[..., ::-1], rgb)
+    assert Path(files[0]).is_relative_to(context.workspace.sensor_folder("A-1"))
+    page.tabs.setCurrentWidget(page.results)
+    page.results.table.choose(page.book.records[0].id)
+    page.results.open_action.trigger()
+    assert page.press_view.work.image.path == Path(files[0])
+
+
+@pytest.mark.parametrize(("system", "value"), [("de_DE", "10,25"), ("en_GB", "10.25")])
+def test_the_table_has_the_decimal_sign_of_the_system_and_the_dialog_says_so(
+    page, qtbot, tmp_path, monkeypatch, system, value
+):
+    table, patterns = tmp_path / "records.csv", []
+    monkeypatch.setattr(QLocale, "system", lambda: QLocale(system))
+    page.book.add(MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 10.25),)), int)
+    _kept(page, qtbot, 1)
+    monkeypatch.setattr(
+        QFileDialog, "getSaveFileName", lambda *given: patterns.append(given[3]) or (str(table), "")
+    )
+    page.results.export_action.trigger()
+    qtbot.waitUntil(lambda: table.exists() and not page.book.busy)
+    (titles, cells) = (line for _, line in read_csv(table))
+    assert cells[titles.index("value")] == value
+    assert ("comma" in patterns[0]) is ("," in value)
+
+
+def test_one_measurement_has_no_spread_and_each_column_its_own_title(page, qtbot):
+    page.book.add(MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 10.25),)), int)
+    _kept(page, qtbot, 1)
+    assert "10.2500" in page.results.statistics.text()
+    assert "0.0000" not in page.results.statistics.text()
+    assert len(set(TITLES)) == len(TITLES)
 
 
 def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(

@@ -144,6 +144,27 @@ def test_a_removed_calibration_leaves_with_its_validation_and_an_older_trash_sta
     assert older.read_bytes() == source.read_bytes()
 
 
+def test_a_renamed_calibration_keeps_its_content_its_validation_and_its_use(workspace, source):
+    place = workspace.import_calibration(source)
+    write_beside(trial(place, GOOD), place)
+    workspace.use(place)
+    content, identity = place.read_bytes(), read_entry(place).summary.identity
+    renamed = workspace.rename(place, "After the new gel")
+    assert renamed.read_bytes() == content and not place.exists()
+    again = Workspace(workspace.folder)
+    (entry,) = again.entries()
+    assert (entry.path, entry.name) == (again.in_use, "After_the_new_gel")
+    assert entry.validated and entry.summary.identity == identity
+
+
+def test_a_name_that_another_calibration_has_is_refused(workspace, source, tmp_path):
+    first = workspace.import_calibration(source)
+    other = workspace.keep_calibration(scene.failed(scene.calibration()), "other")
+    with pytest.raises(InputError, match="has this name"):
+        workspace.rename(other, first.stem)
+    assert first.read_bytes() == source.read_bytes() and other.exists()
+
+
 def test_each_window_of_the_program_has_its_own_calibration_in_use(workspace, source):
     one = workspace.import_calibration(source)
     two = workspace.calibration_path("other", "two")
