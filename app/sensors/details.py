@@ -7,8 +7,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QTabWidget, QWidget
 
 from app.program.calibration_entries import CalibrationEntry
@@ -20,7 +20,7 @@ from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon, busy_bar
-from app.widgets.text_roles import heading
+from app.widgets.text_roles import heading, stack_over_text
 from app.widgets.time_chart import TimeChart
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.finding import Verdict
@@ -31,8 +31,8 @@ from gelpolight_core.session.validation import WORDS
 ItemT = TypeVar("ItemT")
 
 
-TITLES = "", "Sensor", "Verdict", "Validation", "Created", "Age", "Model", "Name"
-"""Titles of the columns of :func:`cells_of`."""
+TITLES = "", "Sensor", "Verdict", "Validation", "Name", "Age", "Created"
+"""Titles of the columns of :func:`cells_of`: what decides and identifies is visible first."""
 SORTED = Verdict.PASS, Verdict.WARN, Verdict.FAIL
 """The verdicts in the order of sorted rows."""
 
@@ -53,16 +53,15 @@ def cells_of(entry: CalibrationEntry, now: datetime, oldest_days: float) -> tupl
     if entry.summary is None:
         broken = TableCell("Broken", "broken", "fail", entry.broken, key=3)
         name = TableCell(entry.name, tip=str(entry.path))
-        return (*first, broken, nothing, nothing, nothing, nothing, name)
+        return (*first, broken, nothing, name, nothing, nothing)
     verdict = entry.summary.verdict
     return (
         *first,
         TableCell(verdict.word, verdict.value, verdict.value, key=SORTED.index(verdict)),
         validated_cell(entry),
-        made_cell(entry),
-        age_cell(entry.age_days(now), oldest_days),
-        TableCell(entry.summary.model),
         TableCell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
+        age_cell(entry.age_days(now), oldest_days),
+        made_cell(entry),
     )
 
 
@@ -122,6 +121,8 @@ class TitledTable(QWidget, Generic[ItemT]):
         Returns the file or folder of an item, which keeps it selected.
     button : (str, str, str)
         Object name, text and tooltip of the button.
+    empty : str
+        Shown in place of an empty table.
     on_chosen : callable
         Called with the path of the selected item.
     """
@@ -134,6 +135,7 @@ class TitledTable(QWidget, Generic[ItemT]):
         cells: Callable[[ItemT], tuple[TableCell, ...]],
         path: Callable[[ItemT], Path],
         button: tuple[str, str, str],
+        empty: str,
         on_chosen: Callable[[Path], object],
     ) -> None:
         super().__init__()
@@ -145,12 +147,15 @@ class TitledTable(QWidget, Generic[ItemT]):
         self.table.selectionModel().selectionChanged.connect(self._enable)
         key, text, tip = button
         self.action = make_action(self, key, text, self._choose, tip=tip)
+        self.table.addAction(self.action)
+        self._stack = stack_over_text(f"{name}.empty", empty, self.table)
         row = hbox(heading(title), None, action_button(self.action))
-        vbox(row, (self.table, 1), of=self, margins=(0, 8, 0, 0))
+        vbox(row, (self._stack, 1), of=self, margins=(0, 8, 0, 0))
 
     def set_entries(self, entries: tuple[ItemT, ...]) -> None:
         """Show these items. The selection is kept."""
         self.table.show_items(entries)
+        self._stack.setCurrentIndex(1 if entries else 0)
         self._enable()
 
     def _enable(self) -> None:
@@ -172,6 +177,7 @@ def sessions_box(on_continue: Callable[[Path], object]) -> TitledTable[SessionEn
         session_cells,
         lambda session: session.folder,
         ("sensors.go_on", "&Continue calibration", tip),
+        "None yet. New sensor makes one: it keeps the images of a calibration.",
         on_continue,
     )
 
@@ -185,6 +191,7 @@ def recordings_box(on_play: Callable[[Path], object]) -> TitledTable[Path]:
         recording_cells,
         lambda path: path,
         ("sensors.play", "Pla&y", "Use the selected recording as the camera"),
+        "None yet. Record on the Inspect page makes one.",
         on_play,
     )
 
@@ -206,7 +213,7 @@ class CalibrationDetails(QWidget):
     Parameters
     ----------
     actions : tuple of QAction
-        Actions on the calibration, the main one first. Three are in the first row.
+        Actions on the calibration, the main one first. Four are in the first row.
     """
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:
@@ -222,15 +229,11 @@ class CalibrationDetails(QWidget):
         # move.
         self._facts.setMinimumHeight(6 * self._facts.fontMetrics().lineSpacing())
         buttons = [action_button(action, primary=action is actions[0]) for action in actions]
-        rows = hbox(*buttons[:3], spacing=8), hbox(*buttons[3:], spacing=8)
+        rows = hbox(*buttons[:4], spacing=8), hbox(*buttons[4:], spacing=8)
         self._area = scroll_area(QWidget())
         set_names(self._area, "sensors.details.stages", "Quality of the stages")
         self.busy = busy_bar("sensors.busy", "Writing the report")
-        self._message = set_names(MarkupLabel(wrap=True), "sensors.message", "Last answer")
-        self._message.linkActivated.connect(
-            lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(path))
-        )
-        parts = self._title, self._facts, *rows, self._message, self.busy
+        parts = self._title, self._facts, *rows, self.busy
         self.chart = TimeChart("sensors.over_time", "Errors of this sensor over time")
         self.chart.setToolTip("All calibrations and validations of the sensor. Dashed: tolerances")
         tabs = set_names(QTabWidget(documentMode=True), "sensors.tabs", "Quality and its change")
@@ -255,12 +258,6 @@ class CalibrationDetails(QWidget):
         # It scrolls only up and down: no limit is cut at the right.
         bar = self._area.verticalScrollBar().sizeHint().width()
         self._area.setMinimumWidth(stages.minimumSizeHint().width() + bar)
-
-    def show_message(self, text: str, path: str = "") -> None:
-        """Show an answer of the program, with a link to a file that was written."""
-        link = f" <a href='{escaped(path)}'>Open</a>" if path else ""
-        role = "pass" if path else "fail"
-        self._message.setText(f"<span style='color:@{role}'>{escaped(text)}</span>{link}")
 
 
 def _stages(entry: CalibrationEntry) -> QWidget:

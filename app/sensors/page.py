@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 from PySide6.QtCore import QFile, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QWidget
 
 from app.program.calibration_entries import ENDING, CalibrationEntry
 from app.program.calibration_status import put_into_use
@@ -22,7 +23,7 @@ from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
 from app.widgets.dialog import Kinds, ask
 from app.widgets.layout import hbox, splitter, vbox
-from app.widgets.text_roles import named_label
+from app.widgets.text_roles import stack_over_text
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.atomic_write import make_folder
@@ -90,7 +91,8 @@ def _series(
     return ChartSeries(name, seconds, [points[time] for time in times], limit, colours, sign)
 
 
-KEYS = {"use": ("Ctrl+U",), "remove": ("Del",)}
+NAME = TITLES.index("Name")
+KEYS = {"use": ("Ctrl+U",), "rename": ("F2",), "remove": ("Del",)}
 TIPS = {
     "new": "Calibrate a sensor from its camera",
     "session": "Calibrate from existing images",
@@ -100,14 +102,19 @@ TIPS = {
     "validate": "Compare measured sizes of known objects with their true sizes",
     "report": "Write a report of this calibration as PDF",
     "copy": "Save this calibration, with its validation, for another computer",
+    "rename": "Change the name of this calibration: its content stays",
     "remove": "Move this calibration to the trash of the system",
 }
 PATTERNS = f"Calibrations (*{ENDING})"
-MEASURE_FIRST = (
-    "Its session is not here, and no saved measurement counts. On the Measure page, open images of "
-    "new presses, state the true sizes, and save each measurement. Then choose Validate again."
+NO_SENSOR = (
+    "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file onto this "
+    "window."
 )
-"""Validation without session and measurements. That of a live image keeps no image to compare."""
+MEASURE_FIRST = (
+    "Its session is not here, and no saved measurement counts. On the Measure page, measure new "
+    "presses, state the true sizes, and save each measurement. Then choose Validate again."
+)
+"""Validation without session and measurements."""
 
 
 class SensorsPage(QWidget):
@@ -121,8 +128,12 @@ class SensorsPage(QWidget):
         self.offered = self._make_actions()
         actions = tuple(self.offered.values())
         self._table = CellsTable(
-            "sensors.table", "Calibrations", TITLES, self._cells, lambda entry: entry.path
+            "sensors.table", "Calibrations", TITLES, self._cells, attrgetter("path"), editable=NAME
         )
+        self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        # Later: the list is shown again only after the editor has closed.
+        self._table.edited.connect(self._rename, Qt.ConnectionType.QueuedConnection)
+        self._table.addActions(actions[4:])
         self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
         self._table.selectionModel().selectionChanged.connect(self._show_chosen)
         self._table.doubleClicked.connect(lambda _: self.offered["use"].trigger())
@@ -130,22 +141,14 @@ class SensorsPage(QWidget):
         self._recordings = recordings_box(self._play)
         self._reports = JobQueue("report", self)
         self._details = CalibrationDetails(actions[4:])
-        self._reports.refused.connect(self._details.show_message)
+        self._reports.refused.connect(partial(context.toasts.show, verdict="fail"))
         self._reports.progressed.connect(lambda *_: self._show_chosen())
         lists = splitter(
             Qt.Orientation.Vertical, (self._table, 3), (self._sessions, 2), (self._recordings, 2)
         )
         parts = (lists, 3), (self._details, 2)
         split = splitter(Qt.Orientation.Horizontal, *parts, sizes=(600, 400))
-        empty = named_label("sensors.empty", "No sensor yet")
-        empty.setText(
-            "No sensor yet. Calibrate a sensor, or drop a session folder or a calibration file "
-            "onto this window."
-        )
-        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._stack = QStackedWidget()
-        self._stack.addWidget(empty)
-        self._stack.addWidget(split)
+        self._stack = stack_over_text("sensors.empty", NO_SENSOR, split)
         bar = hbox(*map(action_button, actions[:4]), None, spacing=8)
         vbox(bar, (self._stack, 1), of=self, margins=(16, 12, 16, 12), spacing=8)
         context.requests.calibrations_changed.connect(self.refresh)
@@ -161,7 +164,8 @@ class SensorsPage(QWidget):
             ("demo", "demo", "&Try the virtual sensor", partial(begin, "demo")),
             ("use", "use", "&Use", partial(for_chosen, self._use)),
             ("validate", "validated", "Va&lidate…", partial(for_chosen, self._validate)),
-            ("report", "report", "Re&port…", self.choose_report),
+            ("report", "report", "Re&port…", partial(for_chosen, self._choose_report)),
+            ("rename", "", "Rena&me", self._edit_name),
             ("copy", "copy", "S&ave a copy…", partial(for_chosen, self._save_copy)),
             ("reveal", "folder", "Show in fol&der", partial(for_chosen, _open_folder)),
             ("remove", "remove", "&Remove", partial(for_chosen, self._ask_to_remove)),
@@ -201,14 +205,11 @@ class SensorsPage(QWidget):
         settings, title = self._context.settings, "Import calibrations"
         self._import(ask_several(self, settings, "calibration", title, PATTERNS))
 
-    def choose_report(self) -> None:
-        """Ask for a file, and write the report of the selected calibration to it."""
-        entry = self.chosen()
-        if entry is not None:
-            settings, name = self._context.settings, f"{entry.path.stem}-report.pdf"
-            path = ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)")
-            if path is not None:
-                self._write_report(entry, path)
+    def _choose_report(self, entry: CalibrationEntry) -> None:
+        settings, name = self._context.settings, f"{entry.path.stem}-report.pdf"
+        path = ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)")
+        if path is not None:
+            self._write_report(entry, path)
 
     def _write_report(self, entry: CalibrationEntry, path: Path) -> None:
         name = self._context.display.value.colours
@@ -224,7 +225,8 @@ class SensorsPage(QWidget):
             write_report(report, path)
 
         def done(_nothing: None) -> None:
-            self._details.show_message(f"Report saved to {path}.", str(path))
+            opens = "Open", partial(_open, path)
+            self._context.toasts.show(f"Report saved to {path}.", actions=(opens,))
 
         self._reports.submit(BackgroundJob("Writing the report", work, done, must=True))
 
@@ -243,16 +245,15 @@ class SensorsPage(QWidget):
     def refresh(self) -> None:
         """Show the present content of the workspace. The selection is kept."""
         workspace, read_list = self._context.workspace, self._context.toasts.read_list
-        entries, recordings = read_list(workspace.entries), read_list(workspace.recordings)
+        self._entries, recordings = read_list(workspace.entries), read_list(workspace.recordings)
         recent = self._context.settings.recent("sessions")
-        sessions = read_list(partial(workspace.sessions, recent))
-        self._entries, self._all_sessions = entries, sessions
-        self._table.show_items(entries)
+        self._all_sessions = sessions = read_list(partial(workspace.sessions, recent))
+        self._table.show_items(self._entries)
         self._sessions.set_entries(sessions)
         self._recordings.set_entries(recordings)
-        self._stack.setCurrentIndex(1 if entries or sessions or recordings else 0)
-        if self.chosen() is None and entries:
-            used = next((entry for entry in entries if entry.in_use), entries[0])
+        self._stack.setCurrentIndex(1 if self._entries or sessions or recordings else 0)
+        if self.chosen() is None and self._entries:
+            used = next((entry for entry in self._entries if entry.in_use), self._entries[0])
             self._table.choose(used.path)
         self._show_chosen()
 
@@ -268,7 +269,7 @@ class SensorsPage(QWidget):
         self.offered["use"].setEnabled(good and entry is not None and not entry.in_use)
         self.offered["validate"].setEnabled(good)
         self.offered["report"].setEnabled(good and not self._reports.busy)
-        for name in ("copy", "reveal", "remove"):
+        for name in ("copy", "reveal", "rename", "remove"):
             self.offered[name].setEnabled(entry is not None)
 
     def _play(self, recording: Path) -> None:
@@ -325,6 +326,16 @@ class SensorsPage(QWidget):
             with self._context.toasts.errors():
                 copy_file(entry.path, path)
 
+    def _edit_name(self) -> None:
+        for index in self._table.selectionModel().selectedRows(NAME):
+            self._table.edit(index)
+
+    def _rename(self, entry: CalibrationEntry, name: str) -> None:
+        with self._context.toasts.errors():
+            renamed = self._context.workspace.rename(entry.path, name)
+            self._context.requests.calibrations_changed.emit()
+            self._table.choose(renamed)
+
     def _ask_to_remove(self, entry: CalibrationEntry) -> None:
         text = f"Move {entry.path.name} to the trash of the system?"
         if entry.in_use:
@@ -339,7 +350,7 @@ class SensorsPage(QWidget):
     def _remove(self, entry: CalibrationEntry) -> None:
         toasts = self._context.toasts
         with toasts.errors():
-            self._context.workspace.remove(entry.path, _discard)
+            self._context.workspace.remove(entry.path, lambda p: bool(QFile.moveToTrash(str(p))))
             toasts.show(f"{entry.path.name} is in the trash of the system.")
         self._context.requests.calibrations_changed.emit()
 
@@ -349,10 +360,10 @@ class SensorsPage(QWidget):
             function(entry)
 
 
-def _discard(file: Path) -> bool:
-    return bool(QFile.moveToTrash(str(file)))
-
-
 def _open_folder(entry: CalibrationEntry) -> None:
     make_folder(entry.path.parent)
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(entry.path.parent)))
+    _open(entry.path.parent)
+
+
+def _open(path: Path) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
-from PySide6.QtCore import QFile
+from PySide6.QtCore import QFile, Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
@@ -221,7 +221,7 @@ def test_each_result_of_a_validation_has_its_word_and_colour_behind_the_sensor(
     identity = scene.calibration().identity
     write_validation(Validation(identity, "2026-03-01T12:00:00+00:00", "", "x", (height,)), path)
     cells = cells_of(read_entry(path), datetime.now(UTC), 365.0)
-    assert TITLES[1:4] == ("Sensor", "Verdict", "Validation")
+    assert TITLES[1:5] == ("Sensor", "Verdict", "Validation", "Name")
     assert (cells[3].text, cells[3].role) == (word, role)
 
 
@@ -242,7 +242,7 @@ def test_sessions_are_continued_and_recordings_played_before_there_is_a_calibrat
     with RecordingWriter(path, RecordingHeader(serial="S-1")) as writer:
         writer.append(np.zeros((24, 32, 3), np.uint8), 0, 1.0)
     page.enter()
-    assert "No sensor yet" not in words(page)
+    assert "No sensor yet" not in words(page) and "None yet" not in words(page)
     button = page.findChild(QPushButton, "sensors.go_on.button")
     sessions, recordings = (
         page.findChild(QTableView, f"sensors.{name}.table") for name in ("sessions", "recordings")
@@ -306,6 +306,23 @@ def test_saved_measurements_validate_a_calibration_without_its_session(
     assert read_entry(path).validated and page.chosen().validated
 
 
+@pytest.mark.function("Rename a calibration")
+def test_a_calibration_is_renamed_in_the_list(page, source, context, qtbot):
+    page.open_path(source)
+    page.offered["use"].trigger()
+    content = page.chosen().path.read_bytes()
+    assert words(page).count("None yet") == 2, "sessions and recordings say what makes one"
+    table = page.findChild(QTableView, "sensors.table")
+    assert {page.offered["rename"], page.offered["use"]} <= set(table.actions()), "right click"
+    page.offered["rename"].trigger()
+    line = table.findChild(QLineEdit)
+    qtbot.keyClicks(line, "new gel")
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: page.chosen().name == "new_gel")
+    assert context.workspace.in_use == page.chosen().path
+    assert page.chosen().path.read_bytes() == content
+
+
 @pytest.mark.function("Save a copy of a calibration file")
 def test_a_copy_of_a_calibration_is_saved(page, source, tmp_path, monkeypatch):
     copy = tmp_path / "copy.gplcal"
@@ -328,7 +345,8 @@ def test_a_report_is_written_in_the_background(page, source, context, tmp_path, 
     qtbot.waitUntil(lambda: page.offered["report"].isEnabled())
     assert not bar.isVisible()
     assert place.stat().st_size > 1000
-    assert str(place) in page.findChild(QLabel, "sensors.message").text()
+    assert str(place) in context.toasts.shown()[-1].text
     page.offered["report"].trigger()
     qtbot.waitUntil(lambda: page.offered["report"].isEnabled())
-    assert str(nowhere.parent) in page.findChild(QLabel, "sensors.message").text(), "it failed"
+    failed = context.toasts.shown()[-1]
+    assert str(nowhere.parent) in failed.text and failed.finding.verdict == "fail"
