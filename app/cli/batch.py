@@ -47,10 +47,8 @@ class BatchCommand(Command):
     inputs: list[Path] = positional("INPUT", "recordings, images, and folders of them")
     output: Path = output("OUT", "folder of the run; an unfinished run is continued", writes=False)
     frames: slice = option(
-        (
-            "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
-            "including B"
-        ),
+        "for each recording and folder: every N-th frame from A, counted from 0, up to but not "
+        "including B",
         type=frame_slice,
         default="",
         metavar="A:B:N",
@@ -61,10 +59,8 @@ class BatchCommand(Command):
         metavar="SHAPE",
     )
     workers: AbstractContextManager[WorkerPool] = option(
-        (
-            "number of worker processes on this machine, each on its own core (default: 1), or "
-            "address of the scheduler of a Dask cluster"
-        ),
+        "number of worker processes on this machine, each on its own core (default: 1), or "
+        "address of the scheduler of a Dask cluster",
         type=_workers,
         default="1",
         metavar="N|ADDRESS",

@@ -20,10 +20,8 @@ class BoardCommand(Command):
 
     output: Path = output("FILE.pdf")
     corners: tuple[int, int] = option(
-        (
-            "inner corners, where four squares meet (default: "
-            f"{BOARD.inner_corners[0]} {BOARD.inner_corners[1]})"
-        ),
+        "inner corners, where four squares meet (default: "
+        f"{BOARD.inner_corners[0]} {BOARD.inner_corners[1]})",
         default=BOARD.inner_corners,
         metavar=("ACROSS", "DOWN"),
     )

@@ -79,9 +79,7 @@ class RefreshCommand(Command):
     calibration: Path = positional("CALIBRATION")
     output: Path = output("CALIBRATION")
     background: list[Path] | None = option(
-        "images of the new gel, untouched; slopes stay as calibrated",
-        one_of=True,
-        metavar="IMAGE",
+        "images of the new gel, untouched; slopes stay as calibrated", one_of=True, metavar="IMAGE"
     )
     session: Path | None = option(
         "background and ball presses of the new gel, which correct them",

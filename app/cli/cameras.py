@@ -33,10 +33,7 @@ class CamerasCommand(Command):
 
     def run(self) -> None:
         """List the connected cameras."""
-        from app.sources.camera_drivers.opencv import (
-            AllCameras,
-            OpenCvDriver,  # slow import
-        )
+        from app.sources.camera_drivers.opencv import AllCameras, OpenCvDriver  # slow import
 
         report(AllCameras(OpenCvDriver()), self.json)
 
@@ -46,11 +43,9 @@ def report(driver: CameraDriver, json: Path | None) -> None:
     entries = []
     for device in driver.devices():
         formats, controls, trouble = _ask(driver, device)
-        lines = (
-            [f"  {trouble}"] if trouble else [*_format_lines(formats), *_control_lines(controls)]
-        )
+        rows = [f"  {trouble}"] if trouble else [*_format_lines(formats), *_control_lines(controls)]
         head = f"{escape_control(device.name)}  [{device.identity}]  {device.address}"
-        print_safe("\n".join([head, *lines]))
+        print_safe("\n".join([head, *rows]))
         entries.append(
             {
                 "name": device.name,
@@ -64,9 +59,8 @@ def report(driver: CameraDriver, json: Path | None) -> None:
         )
     if not entries:
         print_safe(
-            "No camera was found, or this user has no access to it. Connect a camera. "
-            "On Linux, check that /dev/video0 exists and add the user to the group "
-            "video."
+            "No camera was found, or this user has no access to it. Connect a camera. On Linux, "
+            "check that /dev/video0 exists and add the user to the group video."
         )
     if json is not None:
         write_json(json, {"cameras": entries})
@@ -87,10 +81,9 @@ def _ask(
 
 def _format_lines(formats: tuple[CameraFormat, ...]) -> list[str]:
     best_of_all = best_format(formats)
-    lines = []
-    for f in formats:
-        note = ", compressed" if f.compressed else ""
-        lines.append(f"  {'*' if f == best_of_all else ' '} {f}{note}")
+    marks = ("*" if f == best_of_all else " " for f in formats)
+    notes = (", compressed" if f.compressed else "" for f in formats)
+    lines = [f"  {mark} {f}{note}" for mark, f, note in zip(marks, formats, notes, strict=True)]
     if best_of_all is not None and (warning := compression_warning(best_of_all, formats)):
         lines.append(f"  {warning}")
     return lines

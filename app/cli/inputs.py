@@ -80,9 +80,7 @@ def open_inputs(
     duplicates = [item.stem for item in inputs if names[item.stem.casefold()] > 1]
     if duplicates:
         raise InputError(
-            f"Two images have the name {duplicates[0]}",
-            "IMAGE",
-            Remedy.SEPARATE_FOLDERS,
+            f"Two images have the name {duplicates[0]}", "IMAGE", Remedy.SEPARATE_FOLDERS
         )
     return inputs, recordings
 

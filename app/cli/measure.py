@@ -139,11 +139,7 @@ class MeasureCommand(Command):
         rows = {row.file: row.truth for row in read_truth(self.truth).rows}
         for image in self.images:
             if image.name not in rows:
-                raise InputError(
-                    f"There is no row for {image.name}",
-                    self.truth,
-                    Remedy.TRUTH_ROW,
-                )
+                raise InputError(f"There is no row for {image.name}", self.truth, Remedy.TRUTH_ROW)
         return rows
 
 

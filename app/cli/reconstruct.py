@@ -60,9 +60,7 @@ class ReconstructCommand(Command):
         """Reconstruct every image and write its files."""
         if self.uncertainty and "npz" not in self.format:
             raise InputError(
-                "Only npz can contain standard deviations",
-                "--uncertainty",
-                Remedy.REMOVE_OPTION,
+                "Only npz can contain standard deviations", "--uncertainty", Remedy.REMOVE_OPTION
             )
         suffixes = [HEIGHT_MAP_FORMATS[key].suffix for key in self.format]
         with ExitStack() as opened:
@@ -102,13 +100,10 @@ class ReconstructCommand(Command):
                     tqdm.write(f"{item.where}: {finding.line}", file=sys.stderr)
         saved = len(inputs) - refused - unread
         print_safe(f"{saved} depth maps saved to {self.output}")
-        if unread:
-            print_safe(
-                f"gelpolight: {unread} images cannot be used, as said above.", file=sys.stderr
-            )
-        if refused:
-            text = f"{refused} images were refused. Add --despite-faults to use them anyway."
-            print_safe(f"gelpolight: {text}", file=sys.stderr)
+        again = "were refused. Add --despite-faults to use them anyway."
+        for count, text in ((unread, "cannot be used, as said above."), (refused, again)):
+            if count:
+                print_safe(f"gelpolight: {count} images {text}", file=sys.stderr)
         return MENDABLE if refused or unread else 0
 
 

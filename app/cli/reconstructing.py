@@ -24,29 +24,23 @@ from .terminal import print_safe
 
 model = partial(
     option,
-    (
-        "paper: light of the flat membrane, direct integration; full: near "
-        "light, gloss, interreflection, shadows, refracted rays; in-place: a "
-        "closed sensor, from background and balls alone (default: the "
-        "calibration's model)"
-    ),
+    "paper: light of the flat membrane, direct integration; full: near "
+    "light, gloss, interreflection, shadows, refracted rays; in-place: a "
+    "closed sensor, from background and balls alone (default: the "
+    "calibration's model)",
     choices=(*MODELS, IN_PLACE),
 )
 effort = partial(
     option,
-    (
-        "effort of the full model, which solves the pressed region: best at full scale "
-        "(default), balanced at half scale, fast at quarter scale"
-    ),
+    "effort of the full model, which solves the pressed region: best at full scale "
+    "(default), balanced at half scale, fast at quarter scale",
     choices=EFFORTS,
     default=EFFORTS[-1],
 )
 despite_faults = partial(
     option,
-    (
-        "also use images whose depth is meaningless, such as one of another sensor or with an "
-        "LED off; by default they are refused"
-    ),
+    "also use images whose depth is meaningless, such as one of another sensor or with an "
+    "LED off; by default they are refused",
 )
 
 
@@ -57,10 +51,9 @@ def formats() -> Any:
         keys = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
         unknown = sorted(set(keys) - set(HEIGHT_MAP_FORMATS))
         if unknown or not keys:
+            name, known = ", ".join(unknown) or '""', ", ".join(HEIGHT_MAP_FORMATS)
             raise InputError(
-                "Unknown format {name}".format(name=", ".join(unknown) or '""'),
-                "--format",
-                Remedy.ONE_OF.format(names=", ".join(HEIGHT_MAP_FORMATS)),
+                f"Unknown format {name}", "--format", Remedy.ONE_OF.format(names=known)
             )
         return keys
 

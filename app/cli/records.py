@@ -52,15 +52,9 @@ def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
         origin = (str(record.id), f"{record.time:%Y-%m-%d %H:%M}", record.serial, record.shape)
         remarks = record.verdict, record.note.replace("\n", " ")
         for quantity in record.quantities:
-            texts = (
-                "" if value is None else f"{value:{form}}"
-                for value, form in (
-                    (quantity.value, ".4f"),
-                    (quantity.sd, ".4f"),
-                    (quantity.truth, ".4f"),
-                    (quantity.error_percent, "+.2f"),
-                )
-            )
+            lengths = ((value, ".4f") for value in (quantity.value, quantity.sd, quantity.truth))
+            values = *lengths, (quantity.error_percent, "+.2f")
+            texts = ("" if value is None else f"{value:{form}}" for value, form in values)
             cells = (*origin, quantity.name, *texts, *remarks)
             lines.append(_LINE.format(*(escape_control(str(cell)) for cell in cells)))
             origin, remarks = ("", "", "", ""), ("", "")  # once for each record

@@ -80,10 +80,7 @@ class CameraManager(QObject):
     def driver(self) -> CameraDriver:
         """What finds and opens cameras."""
         if self._driver is None:
-            from app.sources.camera_drivers.opencv import (
-                AllCameras,
-                OpenCvDriver,  # slow to import
-            )
+            from app.sources.camera_drivers.opencv import AllCameras, OpenCvDriver  # slow import
 
             self._driver = AllCameras(OpenCvDriver())
         return self._driver

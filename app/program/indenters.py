@@ -22,10 +22,7 @@ def first_indenters() -> tuple[ReferenceObject, ...]:
     """Return the default list: the indenters of the paper's evaluation."""
     rows = [
         ReferenceObject(
-            shape,
-            size,
-            height_mm=height,
-            name=f"{SHAPES[shape]} {size:g} mm, {height:g} mm high",
+            shape, size, height_mm=height, name=f"{SHAPES[shape]} {size:g} mm, {height:g} mm high"
         )
         for shape in WALLED
         for size, height in (

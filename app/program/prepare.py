@@ -16,7 +16,7 @@ from pathlib import Path
 import platformdirs
 
 from gelpolight_core.base.atomic_write import make_folder
-from gelpolight_core.base.compared_quantity import PAPER_PERCENT
+from gelpolight_core.base.compared_quantity import TOLERANCE_PERCENT
 from gelpolight_core.base.errors import InputError
 from gelpolight_core.base.version import __version__
 from gelpolight_core.calibration.manifest import VERSION
@@ -109,9 +109,9 @@ def prepare(
         say(line.format(n=3, step="validating"))
         (press,) = read_truth(session / "presses").rows
         image = session / "presses" / press.file
-        limits = PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]
         measured, _ = measure_press(image, press.truth, Reconstructor(calibration))
-        validation = validate([replace(press, outcome=measured)], calibration.identity, limits)
+        presses = [replace(press, outcome=measured)]
+        validation = validate(presses, calibration.identity, TOLERANCE_PERCENT)
     path = _new_path()
     write_calibration(replace(calibration, validation=validation), path)
     return path
