@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ Bounds = tuple[Float64Array, Float64Array]
 TOLERANCE = 1e-6
 MOST_STEPS = 60
 _LEAST_CURVATURE = np.finfo(np.float64).eps
-_STEP = float(np.sqrt(np.finfo(np.float64).eps))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,31 +111,6 @@ def fit_least_squares(
             damping *= growth
             growth *= 2.0
     return LeastSquares(x, None if np.any(robust) else slopes, converged)
-
-
-def forward_differences(
-    residuals: Callable[[Float64Array], Float64Array],
-    x: Float64Array,
-    columns: Iterable[int] | None = None,
-) -> Float64Array:
-    """Return the Jacobian (m, n) of residuals (m,) by forward differences.
-
-    Parameters
-    ----------
-    residuals : callable
-        Maps parameters (n,) to residuals (m,).
-    x : (n,)
-        Point at which the Jacobian is evaluated.
-    columns : iterable of int, optional
-        Parameters whose derivatives are computed; the other columns are 0. All by default.
-    """
-    residual = residuals(x)
-    slopes = np.zeros((residual.size, x.size))
-    for k in range(x.size) if columns is None else columns:
-        shifted = x.copy()
-        shifted[k] += _STEP * max(1.0, abs(float(x[k])))
-        slopes[:, k] = (residuals(shifted) - residual) / (shifted[k] - x[k])
-    return slopes
 
 
 def _cost(residual: Float64Array, robust: bool | BoolArray) -> float:

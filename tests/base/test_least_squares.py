@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize
 
-from gelpolight_core.base.least_squares import fit_least_squares, forward_differences
+from gelpolight_core.base.least_squares import fit_least_squares
 
 TIME = np.linspace(0.0, 4.0, 400)
 START = np.array([1.0, 0.5, 0.1])
@@ -107,11 +107,3 @@ def test_parameters_of_any_unit_give_the_same_fit(scaled):
         for u in (np.ones(3), unit)
     ]
     assert found[1] == pytest.approx(found[0], rel=1e-6)
-
-
-def test_forward_differences_are_the_slopes():
-    x = np.array([2.0, 1.3, 0.5])
-    found = forward_differences(lambda x: decay(x) / 0.02, x)
-    assert found == pytest.approx(slopes(x), abs=1e-4)
-    some = forward_differences(lambda x: decay(x) / 0.02, x, [0, 2])
-    np.testing.assert_array_equal(some, found * [1.0, 0.0, 1.0])
