@@ -177,7 +177,7 @@ def sessions_box(on_continue: Callable[[Path], object]) -> TitledTable[SessionEn
         session_cells,
         lambda session: session.folder,
         ("sensors.go_on", "&Continue calibration", tip),
-        "None yet. New sensor makes one: it keeps the images of a calibration.",
+        "None yet. A calibration that you begin is listed here, with its images.",
         on_continue,
     )
 
@@ -191,7 +191,7 @@ def recordings_box(on_play: Callable[[Path], object]) -> TitledTable[Path]:
         recording_cells,
         lambda path: path,
         ("sensors.play", "Pla&y", "Use the selected recording as the camera"),
-        "None yet. Record on the Inspect page makes one.",
+        "None yet. What you record on the Inspect page is listed here.",
         on_play,
     )
 

@@ -76,7 +76,8 @@ class TimeChart(QWidget):
         self._plot = bare_plot(bottom=self._days)
         self._plot.setLimits(minXRange=1.0)  # one value alone has a range, too
         self._plot.setLabel("left", "error (%)")
-        self._legend = self._plot.addLegend(offset=(8, 8))
+        self._legend = self._plot.plotItem.legend = pg.LegendItem(colCount=2)
+        self._plot.plotItem.layout.addItem(self._legend, 4, 1)  # below the axis: it hides no point
         vbox(self._plot, of=self, margins=0)
         self._draw()
 
@@ -96,7 +97,6 @@ class TimeChart(QWidget):
         self._plot.clear()
         apply_theme(self._plot)
         self._legend.setLabelTextColor(theme.colour("text"))
-        self._legend.setBrush(theme.colour("base"))  # a limit line does not cross its texts
         self._plot.addItem(pg.InfiniteLine(0.0, angle=0, pen=theme.colour("line")))
         times = sorted({time for series in self.shown for time in series.times_s})
         self._days.show_times(times)
