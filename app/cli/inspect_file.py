@@ -34,7 +34,7 @@ class InspectCommand(Command):
             rows += facts
         visible_mm = Reconstructor(c).visible_depth_mm
         if visible_mm is not None:
-            rows.append(("Smallest visible depth", f"{1e3 * visible_mm:.0f} um"))
+            rows.append(("Smallest visible depth", f"{1e3 * visible_mm:.0f} µm"))
         print_safe(_table(rows))
         print_safe("\n".join(quality_lines(c.quality)))
 

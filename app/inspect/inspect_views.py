@@ -141,8 +141,10 @@ def legend(flags: np.ndarray) -> str:
         fraction = float(np.mean(inside & flag.value != 0)) if inside.size else 0.0
         if fraction > 0.0:
             block = f'<span style="color: rgb{colour}">■</span>'
-            parts.append(f"{block} {FLAG_WORDS[flag]} {100.0 * fraction:.1f} %")
-    return "&nbsp;&nbsp; ".join(parts) or "No flags: all pixels are measured normally."
+            share = "&lt;0.1" if fraction < 0.0005 else f"{100.0 * fraction:.1f}"
+            words = f" {FLAG_WORDS[flag]} {share} %".replace(" ", "&nbsp;")
+            parts.append(block + words)
+    return "&nbsp;&nbsp; ".join(parts) or "No pixel is flagged."
 
 
 class NormalsPanel(SelectableMap):

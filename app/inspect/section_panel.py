@@ -167,10 +167,9 @@ class SectionPanel(QWidget):
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         figures, settings = scroll_area(self._figures), QWidget()
         vbox(self.form, save, None, of=settings, margins=0, spacing=4)
-        scrolled = scroll_area(settings)
         figures.setMinimumWidth(150)
-        scrolled.setFixedWidth(210)
-        hbox((self._plot, 3), (figures, 1), scrolled, of=self, margins=(8, 4, 8, 4), spacing=8)
+        settings.setFixedWidth(210)
+        hbox((self._plot, 3), (figures, 1), settings, of=self, margins=(8, 4, 8, 4), spacing=8)
 
     def _make_plot(self) -> None:
         self._plot = ProfilePlot("inspect.section.plot")

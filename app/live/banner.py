@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.program.jobs import JobQueue
 from app.widgets.actions import push_button
-from app.widgets.label import plain_tip
 from app.widgets.layout import hbox
 from app.widgets.text_roles import named_label, set_background_role, set_text_role
 from app.widgets.widget_names import set_names
@@ -23,7 +22,7 @@ ROLES = {Verdict.PASS: "text", Verdict.WARN: "warn", Verdict.FAIL: "fail"}
 
 
 class AdviceBanner(QWidget):
-    """Shows what to do next. Its space is reserved, so that nothing moves when it is empty.
+    """Shows what to do next. Two lines are reserved, so that nothing moves when it is empty.
 
     Parameters
     ----------
@@ -59,7 +58,8 @@ class AdviceBanner(QWidget):
         self._over = over
         over.installEventFilter(self)
         line, button = self._text.fontMetrics().lineSpacing(), self._button.sizeHint().height()
-        self.setFixedHeight(max(2 * line, button) + 8)
+        self.setMinimumHeight(max(2 * line, button) + 8)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._working = False
         self._show()
 
@@ -83,14 +83,6 @@ class AdviceBanner(QWidget):
             self._text.setText(self._idle if advice is None else advice.line)
             role = "muted" if advice is None else ROLES[advice.verdict]
         self._put_line(over=is_of_another(advice) and not self._working)
-        # A text that is longer than the banner starts in it, and the tooltip shows all of it.
-        room = self._text.rect().adjusted(0, 0, 0, 10 * self.height())
-        wrap = Qt.TextFlag.TextWordWrap
-        text_box = self._text.fontMetrics().boundingRect(room, wrap, self._text.text())
-        is_whole = text_box.height() <= self._text.height()
-        alignment = Qt.AlignmentFlag.AlignVCenter if is_whole else Qt.AlignmentFlag.AlignTop
-        self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | alignment)
-        self._text.setToolTip(plain_tip(self._text.text()))
         set_text_role(self._text, role)
         self._button.setVisible(bool(action_of(advice)) and not self._working)
         self._bar.setVisible(self._working)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QWidget
 
@@ -47,6 +47,7 @@ class ReferenceForm(QWidget):
         self._kept: dict[str, ReferenceObject] = {}
         self._before: dict[str, ReferenceObject] = {}
         self._objects: tuple[ReferenceObject, ...] = ()
+        self._given: tuple[ReferenceObject, ...] = ()
         box = ComboBox(characters=12)
         self.known = set_names(box, "measure.reference.known", "Known object")
         self.known.activated.connect(lambda _index: self._on_known())
@@ -82,6 +83,7 @@ class ReferenceForm(QWidget):
         known : ReferenceObject, optional
             The next object, where the program knows it.
         """
+        self._given = () if known is None else (known,)
         truths = {**self._kept, self._kind: self.stated}
         self._before |= {
             kind: truth for kind, truth in truths.items() if truth != ReferenceObject(kind)
@@ -110,15 +112,17 @@ class ReferenceForm(QWidget):
     def _offer(self) -> None:
         """Show the known objects of the kind, and the values of the press before."""
         before = [("Same as the press before", AGAIN)] if self._kind in self._before else []
-        names = [listed.name for listed in self._objects if listed.shape == self._kind]
-        entries = [("No known object", ""), *before, *((name, name) for name in names)]
+        known = (*self._given, *self._objects)
+        names = [listed.name for listed in known if listed.shape == self._kind]
+        own = "No known object" if self.stated == ReferenceObject(self._kind) else "Own values"
+        entries = [(own, ""), *before, *((name, name) for name in names)]
         self.known.offer(entries, self.stated.name)
 
     def _listed(self, kind: str, name: str) -> ReferenceObject | None:
         """Return the listed values of an object, or None if it is not in the list."""
         listed = (
             reference
-            for reference in self._objects
+            for reference in (*self._given, *self._objects)
             if (reference.shape, reference.name) == (kind, name)
         )
         return next(listed, None)
@@ -133,8 +137,7 @@ class ReferenceForm(QWidget):
     def _on_typed(self) -> None:
         """Forget the known object: its values are no longer those."""
         self.form.value = replace(self.form.value, name="", certificate="", due="", serial="")
-        with QSignalBlocker(self.known):
-            self.known.setCurrentIndex(0)
+        self._offer()
         self._on_changed()
 
 

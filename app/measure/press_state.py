@@ -133,8 +133,8 @@ def resolve_press(
         state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
         if result.tool == tool:
             return _with_result(state, result, reference, quantities_of(result, reference, limits))
-    if refused := work.refused or answer.refused:
-        return replace(state, reason=refused, role="fail")
+    if answer.refused:  # why an image cannot be measured is in the banner
+        return replace(state, reason=answer.refused, role="fail")
     return replace(state, reason="Measuring…" if tool and state.measurable else "")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import groupby
@@ -100,6 +101,7 @@ class ToolList(QListWidget):
         self._work = work
         self.setIconSize(QSize(16, 16))
         self.setWordWrap(True)  # a value is never cut
+        self.setStyleSheet("QListWidget { background: transparent; border: none }")
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.itemClicked.connect(lambda item: work.choose(item.data(Qt.ItemDataRole.UserRole)))
 
@@ -110,8 +112,9 @@ class ToolList(QListWidget):
             answer = self._work.answer_of(key)
             value = "" if answer.refused else "…"
             if answer.result is not None:
-                first = answer.result.figures[0]
-                value = value_text(first.value, unit=first.unit).replace(" ", "\N{NO-BREAK SPACE}")
+                # With the digits of the panel, but without the deviation, which has no room.
+                value = re.sub(" ± [^ °]*", "", answer.result.figures[0].text)
+                value = value.replace(" ", "\N{NO-BREAK SPACE}")
             entry = palette_entry(tool.name)
             item = QListWidgetItem(icon(tool_icon(tool.name)), f"{entry.label} {value}")
             item.setData(Qt.ItemDataRole.UserRole, key)
@@ -186,8 +189,6 @@ class ToolMap(HeightPanel):
             )
         elif self._work.chosen:
             text = "Drag the squares, or move them with the arrow keys."
-        elif self._work.heightmap is not None:
-            text = "Choose a tool on the left, or detect the object (Q)."
         self.hint.setText(text)
 
     # Drawing

@@ -15,7 +15,7 @@ from .context import AppContext
 
 STEPS = {
     "press": ("Press something else", "demo"),
-    "measure": ("Measure it", "measure"),
+    "measure": ("Measure a cylinder", "measure"),
     "practice": ("Calibrate this sensor yourself", "calibrate"),
     "source": ("Connect your own sensor", "sensors"),
 }

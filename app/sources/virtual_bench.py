@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 BOARDS = ("checkerboard", "board_on_top")
 FLAT = ("mirror", "whiteboard", "bare")
 PRESSED = ("ball", "cylinder", "cuboid", "coin", "nut")
+BENCH = "Virtual bench"
 ITEMS = {
-    "checkerboard": "Checkerboard, hand-held",
-    "board_on_top": "Checkerboard on the top surface",
+    "checkerboard": "Checkerboard, held",
+    "board_on_top": "Checkerboard, on top",
     "mirror": "Mirror",
     "whiteboard": "Whiteboard",
     "bare": "Bare membrane",
@@ -116,7 +117,7 @@ class BenchScene:
     @property
     def truth(self) -> ReferenceObject | None:
         """The true values of the object, if it has a shape that can be measured."""
-        truth = ReferenceObject(self.item, self.size_mm, height_mm=self.depth_mm)
+        truth = ReferenceObject(self.item, self.size_mm, height_mm=self.depth_mm, name=BENCH)
         return truth if self.item in SHAPES else None
 
 

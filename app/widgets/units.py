@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gelpolight_core.base.compared_quantity import readable_unit
+from gelpolight_core.base.compared_quantity import readable_unit, unit_behind
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 _SLACK = 1e-9
@@ -29,7 +29,7 @@ def round_up(least: float) -> float:
 def length_text(length_mm: float) -> str:
     """Return a round length as text."""
     unit, factor = readable_unit(length_mm)
-    return f"{round(factor * length_mm, 6):g} {unit}"
+    return f"{round(factor * length_mm, 6):g}{unit_behind(unit)}"
 
 
 def _power_of_ten(length_mm: float) -> float:

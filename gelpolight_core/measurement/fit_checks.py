@@ -110,7 +110,7 @@ def _odd_drape(fit: IndenterFit) -> Finding | None:
     decay = fit.values["drape_decay_mm"]
     if 0.1 <= decay <= 3.0:
         return None
-    return doubtful_finding("drape", f"the fitted decay length of the drape is {decay:.2f} mm")
+    return doubtful_finding("drape", f"the membrane falls off over {decay:.2f} mm around it")
 
 
 def _other_edge(fit: IndenterFit, edge: Known | None) -> Finding | None:
@@ -126,5 +126,5 @@ def _other_edge(fit: IndenterFit, edge: Known | None) -> Finding | None:
 def _cut_drape(window: FitWindow) -> Finding | None:
     if window.seen_share >= SMALLEST_GROUND:
         return None
-    text = f"only {100.0 * window.seen_share:.0f} % of the drape around the object is on the map"
+    text = f"only {100.0 * window.seen_share:.0f} % of the slope around the object is on the map"
     return doubtful_finding("cut_drape", text)

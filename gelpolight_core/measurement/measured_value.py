@@ -40,6 +40,7 @@ LABELS = {
     "sq": "roughness Sq",
     "sz": "roughness Sz",
     "arc": "arc of the section",
+    "drape_decay": "fall-off length",
 }
 """What is shown for a name that says too little."""
 

@@ -184,7 +184,7 @@ def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful():
     close = noisy(pressed("cylinder", centre=(6.6, 4.8)), 9)
     measured = measure_object(on_grid(close, X, Y), shape="cylinder")
     assert measured.verdict == "doubtful"
-    assert "of the drape" in measured.reason
+    assert "of the slope around" in measured.reason
 
 
 @pytest.mark.function("`gelpolight measure --json`: what scripts rely on")

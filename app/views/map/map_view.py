@@ -157,7 +157,7 @@ class MapView(FittedView):
     ) -> None:
         super().__init__(pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False))
         set_names(self, name, accessible)
-        self.setMinimumSize(120, 100)
+        self.setMinimumSize(120, 60)
         self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, True)
         self.box.setBackgroundColor(SURROUND)
         self._plot = pg.PlotItem(viewBox=self.box)

@@ -22,7 +22,7 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 
 # Those of ISO 21920-3 that fit on a sensor.
 CUTOFFS_MM = (0.25, 0.8, 2.5)
-CUTOFFS = {0.0: "none", **{c: f"at {c:g} mm" for c in CUTOFFS_MM}}
+CUTOFFS = {0.0: "off", **{c: f"cut-off {c:g} mm" for c in CUTOFFS_MM}}
 MM = " mm"
 ABOUT_WIDTH = "Depth is averaged over this width across the line"
 ABOUT_LEVEL = "Depth at which the width is measured. 0: half of the height"
@@ -64,7 +64,7 @@ class SectionSettings:
     )
     cutoff_mm: float = choice(0.0, "Ra, Rq, Rz", CUTOFFS, ABOUT_CUTOFF)
     region: bool = switch(
-        False, "", "Roughness", "Measure Sa, Sq and Sz in a rectangle on the height map"
+        False, "Sa, Sq, Sz", "in a rectangle", "Measure Sa, Sq and Sz on the height map"
     )
 
 

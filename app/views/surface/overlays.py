@@ -300,7 +300,7 @@ def draw_scale_bar(plotter: Plotter, box: Box, style: DisplaySettings, ink: Scen
     line = pv.Line((box[0], y, box[4]), (box[0] + length, y, box[4]))
     plotter.add_mesh(line, name="scale-bar", color=ink.text, line_width=4, **PLAIN)
     at, text = [(box[0] + 0.5 * length, y - 0.07 * side, box[4])], [length_text(length)]
-    _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink, always_visible=True)
+    _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink)
 
 
 def _remove(plotter: Plotter, *names: str) -> None:
@@ -324,5 +324,5 @@ def _label(
     **how: Any,
 ) -> None:
     options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
-    options["font_file"] = FONT
+    options |= {"font_file": FONT, "always_visible": True}  # the surface's shadows hide some
     plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)

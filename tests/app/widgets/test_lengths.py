@@ -16,5 +16,5 @@ def test_a_length_is_rounded_to_the_nearest_round_ones(length_mm):
 
 
 def test_short_lengths_are_written_in_micrometres():
-    assert length_text(0.05) == "50 um"
+    assert length_text(0.05) == "50 µm"
     assert length_text(5.0) == "5 mm"
