@@ -151,8 +151,11 @@ class RecordsModel(QObject):
 
 
 def number_of(record: MeasurementRecord, saved: Iterable[MeasurementRecord]) -> int | None:
-    """Return the number under which the same measurement is saved. None: it is not."""
-    measured = attrgetter("picture", "serial", "calibration_id", "shape", "quantities")
+    """Return the number under which the same measurement is saved. None: it is not.
+
+    Its image may have another name by now: a live image is kept as a file.
+    """
+    measured = attrgetter("serial", "calibration_id", "shape", "quantities")
     return next((other.id for other in saved if measured(other) == measured(record)), None)
 
 

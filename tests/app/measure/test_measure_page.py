@@ -254,7 +254,9 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     results.table.doubleClicked.emit(results.table.model().index(0, 0))
     assert page.tabs.currentWidget() is page.press_view
     assert page.press_view.work.image.path == press
-    page.book.add(replace(page.book.records[0], settings={"file": "gone.png"}, picture="gone"), int)
+    other = (Quantity("distance_mm", 1.0),)
+    gone = replace(page.book.records[0], quantities=other, settings={"file": "gone.png"})
+    page.book.add(gone, int)
     _kept(page, qtbot, 3)
     page.press_view.release()
     results.table.choose(3)
@@ -506,6 +508,9 @@ def test_a_live_image_is_kept_with_its_measurement_but_not_one_that_is_a_file_al
     assert files[1] == ""
     assert np.array_equal(cv2.imread(files[0])[..., ::-1], rgb)
     assert Path(files[0]).is_relative_to(context.workspace.sensor_folder("A-1"))
+    page.book.add(replace(page.book.records[0], picture=Path(files[0]).name, note="again"), int)
+    qtbot.waitUntil(lambda: not page.book.busy)
+    assert len(page.book.records) == 2, "measured on the kept image, it is the same measurement"
     page.tabs.setCurrentWidget(page.results)
     page.results.table.choose(page.book.records[0].id)
     page.results.open_action.trigger()
