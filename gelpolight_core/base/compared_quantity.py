@@ -213,10 +213,11 @@ class Quantity:
         """The comparison as one line, or "" without truth or tolerance."""
         if self.verdict is None or self.truth is None:
             return ""
+        percent = 100.0 * self.deviation_expanded / self.truth
+        uncertainty = f" ± {percent:.2f} %" if percent else ", uncertainty unknown"
         return (
             f"{self.label}: measured {self.text}, true {value_text(self.truth, unit=self.unit)}, "
-            f"deviation {self.error_percent:+z.2f} % ± "
-            f"{100.0 * self.deviation_expanded / self.truth:.2f} %: {self.judgement}"
+            f"deviation {self.error_percent:+z.2f} %{uncertainty}: {self.judgement}"
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -178,3 +178,10 @@ def test_a_due_day_that_is_none_is_refused(tmp_path):
 
 def test_a_standard_deviation_needs_nine_repeats_to_be_known_to_a_quarter():
     assert [missing_repeats(count - 1) for count in (1, 5, 8, 9, 25)] == [8, 4, 1, 0, 0]
+
+
+def test_a_deviation_without_known_uncertainty_does_not_claim_to_have_none():
+    unknown = Quantity("height_mm", 1.02, None, 1.0, 8.0)
+    stated = Quantity("height_mm", 1.02, 0.01, 1.0, 8.0)
+    assert "uncertainty unknown" in unknown.sentence and "0.00 %" not in unknown.sentence
+    assert "+2.00 % \N{PLUS-MINUS SIGN} 2.00 %" in stated.sentence
