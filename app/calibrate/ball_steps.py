@@ -45,6 +45,7 @@ from .detection_marks import (
     detect_or_refusal,
     judged_detection,
     refuse_size,
+    table_of,
     working_circle,
 )
 from .image_step import ImageStep
@@ -104,8 +105,7 @@ def detect_open_ball(
     setting: BallDetectionInputs,
     *,
     radius_mm: float,
-    earlier_mm: Sequence[PointXY] = (),
-    next_mm: PointXY | None = None,
+    marks: tuple[OverlayMarker, ...] = (),
     editable: bool = False,
     live: bool = False,
 ) -> Detection:
@@ -119,18 +119,14 @@ def detect_open_ball(
         Results of the earlier stages.
     radius_mm : float
         Radius of the ball.
-    earlier_mm : sequence of (x, y)
-        Centres of the presses captured before, sensor frame.
-    next_mm : (x, y), optional
-        Recommended position of the next press, from :func:`next_press_mm`.
+    marks : tuple of OverlayMarker, optional
+        Marks at earlier presses, and where the next one helps most.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     live : bool, optional
         Only find the contact, without its comparison with the shading: ten times a second.
     """
     table = setting.table
-    earlier_px = _pixels(earlier_mm, table)
-    next_px = () if next_mm is None else _pixels([next_mm], table)
     border = ImageOverlay(lines=(working_circle(table),))
 
     def detect() -> Detection:
@@ -153,11 +149,11 @@ def detect_open_ball(
         circle = ball_handle(indentation, table) if editable else None
         circles = () if circle is None else (circle,)
         contour = ball_contour(indentation, table)
-        marks = border + ImageOverlay(press_marks(earlier_px), circles, contour)
+        overlay = border + ImageOverlay(marks, circles, contour)
         text = f"Ball found: contact radius {contact_mm:.2f} mm, depth {depth_mm:.2f} mm."
-        return judged_detection(marks, figures, text)
+        return judged_detection(overlay, figures, text)
 
-    return detect_or_refusal(detect, marks=border + ImageOverlay(press_marks(earlier_px, next_px)))
+    return detect_or_refusal(detect, marks=border + ImageOverlay(marks))
 
 
 def _pixels(points_mm: Sequence[PointXY], table: ResamplingTable) -> list[PointXY]:
@@ -203,12 +199,9 @@ class BallsStep(ImageStep):
     task = "Press the ball where the ring is, and hold it still."
     assembly = "ball"
     frames, wanted = 4, 10
-    advice = (
-        "Vary the position over the whole field, and the depth. Enter the ball diameter of "
-        "each press."
-    )
+    advice = "Vary depth and position over the whole field. Enter the diameter of each ball."
     figure = "shading_misfit_percent"
-    _next_mm: float | None = None
+    _next_radius_mm: float | None = None
 
     def build(self) -> None:
         """Create what only this step shows."""
@@ -224,7 +217,7 @@ class BallsStep(ImageStep):
 
     def detector(self, name: str) -> Detector:
         """Return the detection of a pressed ball, once the earlier stages are known."""
-        setting, balls = setting_of(self.results), self.results.get(BALLS)
+        setting = setting_of(self.results)
         if setting is None:
             return detect_nothing
         detect = partial(detect_open_ball, radius_mm=self.radius_mm)
@@ -233,10 +226,17 @@ class BallsStep(ImageStep):
             return self.of_capture(
                 name, detect, ImageOverlay(lines=(working_circle(setting.table),))
             )
+        marks = press_marks(*self.places_px())
+        return partial(detect, setting=setting.coarser(), marks=marks, live=True)
+
+    def places_px(self) -> tuple[Iterable[PointXY], Iterable[PointXY]]:
+        """Return where balls were pressed (u, v), and where the next press helps most, if known."""
+        table, balls = table_of(self.results), self.results.get(BALLS)
+        if table is None:
+            return (), ()
         earlier_mm = [] if balls is None else [press.pose.centre_mm for press in balls.presses]
-        next_mm = next_press_mm(setting.table, self.radius_mm, earlier_mm)
-        coarse = setting.coarser()
-        return partial(detect, setting=coarse, earlier_mm=earlier_mm, next_mm=next_mm, live=True)
+        next_mm = next_press_mm(table, self.radius_mm, earlier_mm)
+        return _pixels(earlier_mm, table), () if next_mm is None else _pixels([next_mm], table)
 
     def of_capture(self, name: str, detect: Detector, marks: ImageOverlay) -> Detector:
         """Return the detection for a capture: as placed by hand, or found and ready to be moved."""
@@ -292,21 +292,25 @@ class BallsStep(ImageStep):
         self.radius.take()
 
     def on_bench(self, scene: BenchScene) -> None:
-        """Use the radius of the ball on the virtual bench."""
-        self._next_mm = 0.5 * scene.size_mm
+        """Use the radius of the ball on the virtual bench, and press it where the ring is."""
+        self._next_radius_mm = 0.5 * scene.size_mm
         self._show_radius()
+        if (bench := self.context.source.bench) is not None:
+            for u, v in self.places_px()[1]:
+                bench.drag_to(u, v)
+        self.arm()
 
     def _on_diameter(self, diameter_mm: float) -> None:
         if self.model.page.shown:
             self.model.set_ball_diameter(self.model.page.shown, diameter_mm)
         else:
-            self._next_mm = 0.5 * diameter_mm
+            self._next_radius_mm = 0.5 * diameter_mm
             self.arm()
 
     def _show_radius(self) -> None:
         session, name = self.session, self.model.page.shown
         default_radius_mm = session.ball_default_radius_mm or USUAL_RADIUS_MM
-        next_radius_mm = self._next_mm or default_radius_mm
+        next_radius_mm = self._next_radius_mm or default_radius_mm
         radius_mm = session.ball_radii_mm.get(name, default_radius_mm) if name else next_radius_mm
         with QSignalBlocker(self.radius):
             self.radius.setValue(2.0 * radius_mm)

@@ -23,7 +23,6 @@ from gelpolight_core.geometry.camera import CameraModel
 from gelpolight_core.image.linear_image import LinearImage
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.stages.checkerboards.board_exposure import (
-    blur_error,
     check_exposure,
     edge_limit_px,
     sharpest_edge_px,
@@ -117,11 +116,10 @@ def quick_corners(image: LinearImage, board: BoardSpec) -> Float64Array:
         rough = search_rough_corners(grey, board.inner_corners, longest_px=GLANCE_PX)
     if rough is not None:
         return rough
-    width_px = sharpest_edge_px(grey)
-    if width_px > edge_limit_px(image.size[0]):
-        raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
     columns, rows = board.inner_corners
     message = f"no board with {columns} x {rows} inner corners was found"
+    if sharpest_edge_px(grey) > edge_limit_px(image.size[0]):
+        message += ", or it is blurred"
     raise InputError(message, image.name, Remedy.SHOW_BOARD)
 
 
@@ -167,17 +165,14 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
 class LensStep(ImageStep):
     """Analyses each view at once, before there are enough of them to compute the lens."""
 
-    judges_focus = True
+    judges = "dark", "focus"
 
     of = LENS
     guide = "guide/calibrate", "2-lens"
     task = "Hold the checkerboard in front of the camera, tilted in a new direction for each image."
     assembly = "camera"
     frames, wanted, least = 1, 12, MIN_VIEWS
-    advice = (
-        "Use the camera alone. Tilt the board by 15 to 40 degrees, until its corners have "
-        "covered the whole image."
-    )
+    advice = "Use the camera alone. Tilt the board by 15 to 40 degrees. Cover the whole image."
 
     def build(self) -> None:
         """Analyse the views that the session has, and each new one."""

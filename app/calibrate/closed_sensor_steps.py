@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.live.overlay import ImageOverlay, OverlayCircle, OverlayMarker
-from gelpolight_core.base.arrays import Float32Array, PixelArray
+from gelpolight_core.base.arrays import Float32Array, PixelArray, PointXY
 from gelpolight_core.base.finding import Finding, QualityTable, Verdict, finding_from_error
 from gelpolight_core.calibration.closed_sensor.pixel_scale import find_pins, find_punch
 from gelpolight_core.calibration.closed_sensor.press_sizes import PressSize
@@ -127,10 +127,7 @@ class ScaleStep(ImageStep):
 
     of = SCALE
     guide = "guide/closed-sensors", "scale"
-    task = (
-        "Press the pin grid or the flat punch straight into the membrane, at a new place for "
-        "each image."
-    )
+    task = "Press the pin grid or the flat punch straight in, at a new place for each image."
     assembly = "indenter"
     frames, wanted = 4, 3
     advice = "The size of a pixel is measured on it. Its own size is stated in the set-up."
@@ -245,7 +242,7 @@ class InPlaceBallsStep(BallsStep):
         files = session.found("background")
         if not files:
             return detect_nothing
-        slopes, declared = self._run(), session.in_place or ClosedSensorSettings()
+        declared = session.in_place or ClosedSensorSettings()
         if declared.mm_per_px is None:
             scale = self.results.get(SCALE)
             if scale is None:
@@ -258,12 +255,16 @@ class InPlaceBallsStep(BallsStep):
         )
         if name:
             return self.of_capture(name, partial(detect, editable=True), ImageOverlay())
+        return partial(detect, marks=press_marks(*self.places_px()))
+
+    def places_px(self) -> tuple[Iterable[PointXY], Iterable[PointXY]]:
+        """Return where balls were pressed, and where the next press helps, until it does not."""
+        slopes = self._run()
         if slopes is None:
-            return detect
+            return (), ()
         to_pixels, next_mm = slopes.result.model.grid.to_pixels, slopes.result.next_position_mm
         earlier_px = to_pixels(np.array([(x, y) for _name, x, y, *_ in slopes.balls]))
-        next_px = () if progress_of(slopes).settled else to_pixels(np.array([next_mm]))
-        return partial(detect, marks=press_marks(earlier_px, next_px))
+        return earlier_px, () if progress_of(slopes).settled else to_pixels(np.array([next_mm]))
 
     def _run(self) -> SlopesStageResult | None:
         """Return the calibration of the present presses."""

@@ -22,7 +22,7 @@ from gelpolight_core.calibration.recipe import Stage
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
 
 from .detection_marks import Detector, detect_or_refusal, read_raw
-from .page_state import OPEN, Capture
+from .page_state import Capture
 from .step import NO_CAMERA, Step
 
 # After an automatic capture the technician has this long to arrange the next view.
@@ -39,7 +39,8 @@ def judged_stage(status: StageStatus) -> Finding | None:
 class ImageStep(Step):
     """A step with images of its own. A subclass supplies detection and judgement of a capture."""
 
-    judges_focus = False
+    judges: tuple[str, ...] = ("dark",)
+    """What is judged of its live images, see `LiveView.judge`."""
     _armed: tuple[Any, ...] = ()
     _paused_until = 0.0
     _fresh = ""
@@ -83,7 +84,7 @@ class ImageStep(Step):
     def obstacle(self) -> str:
         """Return what is missing or wrong. Empty: the step is complete or being computed."""
         state, sentence = self.model.page.states[self.key]
-        if state not in OPEN:
+        if not self.needs_user(state):
             return ""
         if state == StageState.EMPTY.value:
             sentence = "Nothing is captured yet"
@@ -109,7 +110,7 @@ class ImageStep(Step):
     def enter(self) -> None:
         """Show the live image of the step."""
         # Turning the lens after the lens step makes a new calibration necessary.
-        self.area.view.judge_focus(self.judges_focus)
+        self.area.view.judge(*self.judges)
         self.model.live_detection.forget_movement()
         super().enter()
         self.camera_changed()
@@ -199,20 +200,20 @@ class ImageStep(Step):
         if change:
             self._show(replace(detection, finding=Finding("camera", change, verdict=Verdict.WARN)))
             return
-        is_automatic = self.panel.automatic.isChecked() and not self.model.busy_with_images
-        if is_automatic and detection.good and not self._has_its_image:
-            if current.moved:
-                held_share, sentence = current.held, "Hold still: captures by itself."
-            else:
-                sentence += " Move it for an automatic capture, or click Capture."
-        elif self.model.page.finished:
-            sentence = "This step is complete."
         overlay, finished = detection.overlay, self.model.page.finished
+        is_automatic = self.panel.automatic.isChecked() and not self.model.busy_with_images
+        captures = is_automatic and detection.good and not self._has_its_image
+        if captures and current.moved:
+            held_share, sentence = current.held, "Hold still: captures by itself."
+        elif finished:
+            sentence = "This step is complete."
+        elif captures:
+            sentence += " Move it for an automatic capture, or click Capture."
         if finished and not detection.ready:
             overlay = ImageOverlay()  # no other view is expected
         rings = hold_ring(overlay, self.area.view.image.image_size, held_share)
         self.area.view.set_overlay(replace(overlay, rings=rings))
-        waits = not detection.ready and not self.count()
+        waits = not detection.ready and not (self.count() and not self.model.jobs.busy)
         self.model.show_live(sentence, ready=detection.good or finished, waits=waits)
 
     def detected(self, done: Done[SourceFrame, HeldDetection | None]) -> None:
@@ -227,7 +228,7 @@ class ImageStep(Step):
                 self._show_seen(done.result)
             else:
                 self.area.view.set_overlay(ImageOverlay())
-                self.model.show_live("The image is changing.", ready=False)
+                self.model.show_live("The image is changing.", ready=False, waits=True)
             if self._is_good(done.request, done.result):
                 self.capture_by_itself()
 

@@ -131,7 +131,7 @@ class LightsStep(ImageStep):
     guide = "guide/calibrate", "4-lights"
     task = "Lay the mirror on the top opening, with all LEDs on and the room dark."
     assembly = "mirror"
-    frames, wanted = 16, 1
+    frames, wanted, judges = 16, 1, ()
     advice = "Shorten the exposure until the three spots are small and not saturated."
     figure = "led_sd_mm"
 
@@ -326,10 +326,7 @@ class BackgroundStep(LightStep):
     guide = "guide/calibrate", "6-background"
     task = "Mount the membrane, and let nothing touch it."
     assembly = "membrane"
-    advice = (
-        "Switch automatic exposure and white balance off, and do not change the exposure or "
-        "the light afterwards."
-    )
+    advice = "Switch automatic exposure and white balance off. Do not change the light afterwards."
 
     def result_panels(self) -> tuple[ImagePanel, ...]:
         """Return the reflectance factor of each LED."""

@@ -58,6 +58,10 @@ OPEN = (StageState.EMPTY.value, BEGUN, StageState.FAIL.value)
 """States in which a step still needs the user."""
 
 
+UNJUDGED = (RUNNING, StageState.STALE.value, StageState.WAITING.value)
+"""States in which the present captures are not judged yet."""
+
+
 def is_done(state: str) -> bool:
     """Return whether a step in this state is complete."""
     return state in (StageState.PASS.value, StageState.WARN.value)

@@ -68,8 +68,12 @@ class SetupForm(QWidget):
         holder, foot = (QWidget(maximumWidth=640, minimumWidth=320) for _ in range(2))
         inside = QWidget()
         hbox(None, (holder, 20), None, of=inside)
-        below = hbox(None, (foot, 20), None)
-        vbox((scroll_area(inside), 1), below, of=self, margins=0, spacing=0)
+        below, area = hbox(None, (foot, 20), None), scroll_area(inside)
+        bar = area.verticalScrollBar()  # the foot is in the middle of what it leaves
+        bar.rangeChanged.connect(
+            lambda _, end: below.setContentsMargins(0, 0, bar.sizeHint().width() if end else 0, 0)
+        )
+        vbox((area, 1), below, of=self, margins=0, spacing=0)
         self._title, self._task = heading("", size=1.35), PlainLabel(wrap=True)
         self.values = Form(SetupValues(), "setup")
         # Rows that wrap have no height of their own in a scroll area.
@@ -113,8 +117,7 @@ class SetupForm(QWidget):
         title = "Sensor data" if values.optics else "Closed sensor"
         task = (
             "Enter the values from the drawing of the housing and the data sheets of the parts. "
-            "Every length here scales the result. You can change the values later. Then click the "
-            "button at the bottom."
+            "Every length here scales the result. You can change the values later."
         )
         if not values.optics:
             task = (
@@ -230,10 +233,7 @@ class SetupStep(Step):
 
     key, title, stages = "setup", "Set-up", ("response",)
     guide = "guide/calibrate", "1-set-up"
-    task = (
-        "Enter what you know about the sensor, its housing and its parts. Every length here "
-        "scales the result."
-    )
+    task = "Enter what you know about the sensor. Every length here scales the result."
 
     def build(self) -> None:
         """Create the form."""
@@ -265,9 +265,7 @@ class SetupStep(Step):
     def leave(self) -> None:
         """Warn about changes that are not applied."""
         if self.form.edited:
-            text = (
-                "The set-up changes are not applied yet. Go back to the set-up step to apply them."
-            )
+            text = "The set-up changes are not applied yet. Apply them in the set-up step."
             self.context.toasts.show(text, "warn")
 
     def close(self) -> None:

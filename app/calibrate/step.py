@@ -105,7 +105,7 @@ class Step(QObject, StepDeclaration):
     def state_of(self, stages: Sequence[str]) -> StepState:
         """Return state and message of the worst of some stages.
 
-        A step with too few images has not failed: it is still incomplete.
+        A step with too few images has neither failed nor passed: it is still incomplete.
         """
         if self.model.running in stages:
             return RUNNING, "Computing"
@@ -114,9 +114,10 @@ class Step(QObject, StepDeclaration):
             return "empty", ""
         worst = max(statuses, key=lambda status: ORDER.index(status.state.value))
         is_next = self.model.jobs.busy and self.model.page.step is self
-        if worst.state is StageState.STALE and is_next:  # with what was just captured
+        if is_next and worst.state in (StageState.STALE, StageState.WAITING):  # just captured
             return RUNNING, "Computing"
-        if worst.state is StageState.FAIL and 0 < self.count() < self.least:
+        enough = {StageState.FAIL: self.least, StageState.PASS: self.wanted}
+        if 0 < self.count() < enough.get(worst.state, 0):
             return BEGUN, f"{self.count()} of {self.wanted} captured"
         return worst.state.value, worst.sentence
 
@@ -131,6 +132,11 @@ class Step(QObject, StepDeclaration):
     def is_finished(self, state: str) -> bool:
         """Return whether nothing is left to do in the step."""
         return is_done(state) and self.count() >= self.wanted
+
+    def needs_user(self, state: str) -> bool:
+        """Return whether the next step has to wait for the user of this one."""
+        statuses = [self.model.statuses[stage].state.value for stage in self.stages]
+        return state in OPEN and not all(is_done(stage) for stage in statuses)
 
     def obstacle(self) -> str:
         """Return why the next step cannot follow yet, or an empty text."""
@@ -253,7 +259,7 @@ def states_of(steps: Sequence[Step]) -> dict[str, StepState]:
         empty = state == StageState.EMPTY.value and not step.folder and bool(step.stages)
         if first_open and (empty or state == StageState.WAITING.value):
             text = f"Waiting for {first_open}. Complete that step first."
-        if not first_open and step.folder and state in OPEN:
+        if not first_open and step.folder and step.needs_user(state):
             first_open = step.title
         states[step.key] = state, text
     return states

@@ -25,9 +25,10 @@ from app.widgets.dialog import Dialog, Kinds
 from app.widgets.label import plain_tip
 from app.widgets.layout import scroll_area, vbox
 from app.widgets.widget_names import set_names
-from gelpolight_core.session.session import Session
+from gelpolight_core.lab.press_folder import FOLDER as PRESSES
 
 from .page_state import StepDeclaration, StepState, state_icon, state_word
+from .step import Step
 from .wizard_model import WizardModel
 
 AREA_HEIGHT = 280
@@ -58,7 +59,7 @@ class BenchSection(QWidget):
         self.toggle = fold.title
 
         vbox((fold, 100), None, of=self, margins=0)
-        self._tried = 0
+        self._laid: tuple[Step | None, BenchScene | None, int] = None, None, 0
         self._grab_offset: tuple[float, float] | None = None
         self.hide()
 
@@ -80,17 +81,21 @@ class BenchSection(QWidget):
         if not in_use:
             self.toggle.setChecked(False)
 
-    def lay(self, step: StepDeclaration, session: Session) -> BenchScene | None:
+    def lay(self, step: Step) -> bool:
         """Place the object that a step needs, at the next view or press."""
         bench = self._source.bench
         if bench is None:
-            return None
-        folder, count = step.folder, self._tried
-        if folder:
-            count = len(session.found(folder))
-        else:
-            folder, self._tried = "presses", self._tried + 1
-        return bench.show(folder, count % bench.steps(folder))
+            return False
+        folder = step.folder or PRESSES
+        count = len(step.session.found(folder))
+        step.on_bench(bench.show(folder, count % bench.steps(folder)))
+        self._laid = step, bench.scene, step.count()
+        return True
+
+    def goes_on(self, step: Step) -> bool:
+        """Return whether an object placed for a step was captured, and was not moved since."""
+        bench, (laid, scene, count) = self._source.bench, self._laid
+        return bench is not None and (laid, scene) == (step, bench.scene) and step.count() > count
 
     def drag_to(self, u: float, v: float) -> None:
         """Move the object on the bench to the clicked point of the live image."""

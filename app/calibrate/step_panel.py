@@ -239,7 +239,7 @@ class StepPanel(QWidget):
             QPushButton("Place it on the virtual &bench"),
             "calibrate.lay",
             "Place the object for this step on the virtual bench",
-            "Each click gives the next view or press, as a technician would arrange it",
+            "After an automatic capture the next view or press follows, until you move the object",
         )
         self.lay.hide()
         self.live = named_label("calibrate.live", "Content of the live image")
@@ -345,7 +345,8 @@ class StepPanel(QWidget):
         self.notice.setText(notice)
         self.notice.setVisible(bool(notice))
         self.sentence.setText(page.sentence)
-        self.sentence.setVisible(bool(is_wrong) and not notice)
+        set_text_role(self.sentence, "pass" if page.state == "pass" else "")
+        self.sentence.setVisible(bool(is_wrong or page.remedies) and not notice)
         texts = [text for text, _ in page.remedies[: len(self.buttons)]]
         for button, text in zip(self.buttons, (*texts, *[""] * REMEDIES), strict=False):
             button.setVisible(bool(text))

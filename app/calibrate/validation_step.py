@@ -43,7 +43,7 @@ from gelpolight_core.session.validation import WORDS, Validation
 
 from .detection_marks import read_raw
 from .image_panels import ImagePanel, depth_panel
-from .page_state import RemedyButton, StepState
+from .page_state import BEGUN, RemedyButton, StepState
 from .press_table import PressTable
 from .result_step import ask_report
 from .step import Step
@@ -62,10 +62,7 @@ class ValidationStep(Step):
     guide = "guide/validate", "validate"
 
     key, title, stages = "validation", "Validation", ()
-    task = (
-        "Press objects of known size. The calibration is validated only if every measured size "
-        "conforms to the tolerance."
-    )
+    task = "Press objects of known size. Every measured size must conform to the tolerance."
     assembly = "indenter"
     frames = FRAMES
     button = "&Measure the press"
@@ -99,9 +96,8 @@ class ValidationStep(Step):
         self.verdict = named_label("validation.verdict", "All presses together")
         self.calibration = named_label("validation.calibration", "Calibration to validate")
         listed = QWidget()
-        self.passed = named_label("validation.passed", "Validated", bold=1.0, role="pass")
         parts = self.next_press, self.table, self.verdict, self.result, self.calibration
-        vbox(self.passed, *parts, of=listed, margins=0)
+        vbox(*parts, of=listed, margins=0)
         self.keep = push_button("validation.keep", "&Record this validation", self.record)
         set_property(self.keep, "primary", True)
         self.own = (
@@ -131,7 +127,8 @@ class ValidationStep(Step):
         """Return whether the saved calibration is validated."""
         validation = self._recorded()
         if validation is None:
-            return "empty", "Not validated yet"
+            is_begun = len(self._presses) > len(self._missing)
+            return BEGUN if is_begun else "empty", "Not validated yet"
         if not self.model.saved:
             return "stale", "The captures or corrections have changed since the validation"
         word, largest = WORDS[validation.verdict], f"{validation.largest_percent:.2g} %"
@@ -141,9 +138,9 @@ class ValidationStep(Step):
         return validation.verdict.value, f"{word}. {validation.what_decides}".strip()
 
     def number(self) -> Finding | None:
-        """Return the largest error of the recorded validation."""
-        validation = self._recorded()
-        if validation is None:
+        """Return the largest error of the recorded validation, or else of the present presses."""
+        validation = self._recorded() or self._trial()
+        if validation is None or not validation.comparisons:
             return None
         return Finding("largest_error", "Largest error", validation.largest_percent, "%")
 
@@ -180,16 +177,10 @@ class ValidationStep(Step):
         path, present = self.model.saved_path, bool(self.model.saved)
         text = "Save the calibration first. A validation belongs to a saved calibration."
         if path is not None:
-            text = (
-                f"Calibration: {path.stem}. Its captures or corrections have changed since. "
-                "Save it again."
-            )
+            text = f"{path.stem}: captures or corrections have changed since. Save it again."
         self.calibration.setVisible(not present)
         self.calibration.setText(text)
         set_text_role(self.calibration, "" if present else "warn")
-        state, sentence = self.state()
-        self.passed.setText(sentence)
-        self.passed.setVisible(state == "pass")
         if path != self._reconstructor[0]:
             self._follow()
         elif self.model.page.step is self:
@@ -315,7 +306,7 @@ class ValidationStep(Step):
             replace(press, outcome=self._outcomes.get(press.file, "")) for press in listed
         )
         if self.model.page.step is self:
-            self._show_presses()
+            self.model.changed.emit()
             self._measure_next()
 
     def _show_presses(self) -> None:
@@ -333,10 +324,10 @@ class ValidationStep(Step):
             text = "Nothing is listed yet. Add an object below, or measure one press of it."
         self.next_press.setText(text)
         self.table.show_presses(self._presses, {press.file for press in missing}, limits)
-        is_complete = bool(count) and not missing and all(press.outcome for press in self._presses)
-        trial = self._trial() if is_complete else None
+        trial, recorded = self._trial(), self._recorded()
         recordable = trial is not None and is_recordable(self._presses, trial)
-        self.keep.setEnabled(recordable)
+        is_new = recorded is None or trial is None or recorded.comparisons != trial.comparisons
+        self.keep.setEnabled(recordable and is_new)
         text, role = ("", "") if self._newest is None else press_lines(self._newest[0], limits)
         self.result.setText(text)
         self.result.setVisible(bool(text))
@@ -348,12 +339,12 @@ class ValidationStep(Step):
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
             self.verdict.setText(worst.strip() if recordable else doubtful)
             set_text_role(self.verdict, trial.verdict.value if recordable else "warn")
-        self.model.update_page(below=self.progress_line())
 
     def _trial(self) -> Validation | None:
-        """Return the validation by the measured presses, or None before the calibration is read."""
-        reconstructor = self._reconstructor[1]
-        if reconstructor is None:
+        """Return the validation by the listed presses, or None before all of them are measured."""
+        reconstructor, presses = self._reconstructor[1], self._presses
+        is_complete = bool(presses) and not self._missing and all(p.outcome for p in presses)
+        if reconstructor is None or not is_complete:
             return None
         limits = self.context.settings.limits.percent
         return validate(self._presses, reconstructor.calibration.identity, limits)
@@ -370,7 +361,8 @@ class ValidationStep(Step):
                 store = partial(self._store, self._file_for())
                 self._follow()
                 self.model.show_live("Capturing: hold the object still.", ready=True)
-                live.capture(FRAMES, store, self._refuse)
+                still_s = self.model.live_detection.still_s
+                live.capture(FRAMES, store, self._refuse, still_s=still_s)
 
     def choose_files(self) -> None:
         """Let the user choose images of presses, and measure them."""
@@ -479,4 +471,5 @@ class ValidationStep(Step):
             return
         self.model.show_notice("", "pass")
         self.context.requests.calibrations_changed.emit()
+        self.panel.buttons[0].setFocus()
         self.panel.reveal_message()

@@ -27,7 +27,7 @@ from .closed_sensor_steps import InPlaceBallsStep, ScaleStep
 from .image_area import ImageArea
 from .image_step import plain_step
 from .light_steps import BackgroundStep, LightsStep, WhiteboardStep
-from .page_state import OPEN, PageState, is_done
+from .page_state import BEGUN, UNJUDGED, PageState, is_done
 from .result_step import ResultStep
 from .setup_step import SetupStep
 from .step import Step, resolve_page
@@ -119,7 +119,6 @@ class Wizard(QWidget):
             "next_step": ("Next step", self._next, ("Alt+Right",)),
             "previous_step": ("Previous step", lambda: self._go_by(-1), ("Alt+Left",)),
         }
-        self._display = self.context.display.value
         self._keys = {
             name: make_action(self, f"calibrate.{name}", text, act, keys=keys)
             for name, (text, act, keys) in keys.items()
@@ -173,11 +172,9 @@ class Wizard(QWidget):
 
     def enter(self) -> None:
         """Open the camera when the wizard is shown."""
-        if self._display != self.context.display.value:  # changed on another page
-            self.refresh()
         self.model.camera.refer()
         self.live.enter(True)
-        self._show_task()
+        self.refresh()  # the display may have changed on another page
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
@@ -222,17 +219,19 @@ class Wizard(QWidget):
         self.live.use(self.open.frames > 0)
         self.open.enter()
         self._compute_what_never_was()
-        self._show_task()
+        self.centre.setCurrentWidget(self.open.centre)
+        self._focus_on_what_comes_next()
         self.refresh()
 
     def _show_task(self) -> None:
-        """Show the sensor and the open step in the state bar."""
+        """Show the sensor and the open step in the state bar, at the end the calibration."""
+        page = self.model.page
         if self.live.page_shown:
-            n, count = self.model.page.place + 1, len(self.steps)
-            task = f"Calibrating: {n} of {count}"
-            self.context.status.update(sensor=self.project.session.serial, task=task)
-        self.centre.setCurrentWidget(self.open.centre)
-        self._focus_on_what_comes_next()
+            task = f"Calibrating: {page.place + 1} of {len(self.steps)}"
+            is_end = page.finished and not page.following
+            self.context.status.update(
+                sensor=self.project.session.serial, task="" if is_end else task
+            )
 
     def _next(self) -> None:
         """Show the next step, or say what is missing in this one."""
@@ -250,9 +249,9 @@ class Wizard(QWidget):
         """Return the first step that is not complete."""
         states = self.model.page.states
         for step in self.steps:
-            if step.folder and states[step.key][0] in OPEN:
+            if step.folder and step.needs_user(states[step.key][0]):
                 return step.key
-        tried = states["validation"][0] != StageState.EMPTY.value
+        tried = states["validation"][0] not in (StageState.EMPTY.value, BEGUN)
         ready = is_done(states["result"][0]) and self.model.saved and not tried
         return "validation" if ready else "result"
 
@@ -275,7 +274,6 @@ class Wizard(QWidget):
 
     def refresh(self) -> None:
         """Show the present state of everything."""
-        self._display = self.context.display.value
         statuses = self.project.statuses()
         if statuses.keys() != self.model.statuses.keys():
             self._renewal.start()
@@ -283,6 +281,8 @@ class Wizard(QWidget):
         self.model.statuses = statuses
         self.model.show_page(resolve_page(self.model.page, self.steps, self.open))
         self.open.refresh()
+        self._show_task()
+        self._go_on_with_bench()
 
     def _render(self, before: PageState) -> None:
         """Draw what the page shows."""
@@ -338,11 +338,16 @@ class Wizard(QWidget):
     # The virtual bench
 
     def _lay_on_bench(self) -> None:
-        scene = self.bench.lay(self.open, self.project.session)
-        if scene is not None:
-            self.open.on_bench(scene)
+        self.open.live()
+        if self.bench.lay(self.open):
             self.model.live_detection.count_movement()
-            self.open.live()
+
+    def _go_on_with_bench(self) -> None:
+        """After an automatic capture, place the next view or press until the step is complete."""
+        page = self.model.page
+        is_due = page.state not in UNJUDGED and not (page.finished or page.shown)
+        if is_due and self.panel.automatic.isChecked() and self.bench.goes_on(self.open):
+            self._lay_on_bench()
 
     def _follow_bench(self) -> None:
         """Let drags move the object on the bench, if it is visible next to the live image."""

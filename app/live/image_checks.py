@@ -46,13 +46,15 @@ def saturation_image(rgb: PixelArray) -> NDArray[np.uint8]:
     return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
 
 
-def measure_exposure(rgb: PixelArray) -> Finding:
+def measure_exposure(rgb: PixelArray, *, dark: bool = True) -> Finding:
     """Judge the exposure of an image. The value is the share of saturated pixels in percent.
 
     Parameters
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
         The whole image.
+    dark : bool, optional
+        Whether an image can be too dark: one that is dark by design is not.
     """
     saturation = saturation_image(rgb)
     fraction = cv2.countNonZero(saturation) / saturation.size
@@ -62,7 +64,7 @@ def measure_exposure(rgb: PixelArray) -> Finding:
         verdict = Verdict.FAIL if fraction > SATURATED_FAIL else Verdict.WARN
         percent = _percent(100.0 * fraction)
         text = f"Too bright: {percent} % of the pixels are saturated. Shorten the exposure."
-    elif brightest < DARK_SHARE_OF_SCALE:
+    elif dark and brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
         text = f"Too dark: maximum {_percent(100.0 * brightest)} % of the scale. "
         text += "Lengthen the exposure."

@@ -86,7 +86,7 @@ class LiveView(QWidget):
         self._rgb: PixelArray | None = None
         self._overlay = ImageOverlay()
         self._best_focus = BestFocus()
-        self._judges_focus = True
+        self._judged: tuple[str, ...] = "dark", "focus"
         self._checked_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self.shown_frames = 0
@@ -163,13 +163,16 @@ class LiveView(QWidget):
         self._overlay = overlay or ImageOverlay()
         self._draw_overlay()
 
-    def judge_focus(self, on: bool) -> None:
-        """Show or hide the focus of live images: most scenes have no edges to focus on."""
-        self._judges_focus = on
+    def judge(self, *checks: str) -> None:
+        """Judge only this of the images: "dark", and the "focus" of live ones.
+
+        A scene can be dark by design, and most scenes have no edges to focus on.
+        """
+        self._judged = checks
         self._show_focus(self._stream is not None)
 
     def _show_focus(self, on: bool) -> None:
-        self._checks.focus.setVisible(on and self._judges_focus)
+        self._checks.focus.setVisible(on and "focus" in self._judged)
 
     def save_snapshot(self) -> None:
         """Save the shown image as PNG with full bit depth and without marks, named by its time."""
@@ -221,7 +224,7 @@ class LiveView(QWidget):
         self.image.show_rgb(rgb)
 
     def _check(self, rgb: PixelArray, now_s: float) -> None:
-        exposure = measure_exposure(rgb)
+        exposure = measure_exposure(rgb, dark="dark" in self._judged)
         self._checks.show_line(f"{exposure.verdict.sign} {exposure.text}")
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():

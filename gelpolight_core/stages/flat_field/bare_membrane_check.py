@@ -119,7 +119,7 @@ def brightness_figure(small: Float32Array, area: BoolArray) -> Finding:
     dimmest = int(np.argmin(brightest))
     return judge(
         "brightest_percent",
-        f"Brightness of the darkest colour ({CHANNEL_KEYS[dimmest]}), its brightest pixels",
+        f"Brightness of the darkest colour, {CHANNEL_KEYS[dimmest]}",
         float(brightest[dimmest]),
         "%",
         warn=25.0,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
-from app.calibrate.ball_steps import BallDetectionInputs, detect_open_ball
+from app.calibrate.ball_steps import BallDetectionInputs, detect_open_ball, press_marks
 from app.calibrate.board_steps import detect_board, detect_top_pose
 from app.calibrate.detection_marks import as_image, mirror_positions_px
 from app.calibrate.light_steps import detect_background, detect_mirror, detect_whiteboard
@@ -184,7 +184,11 @@ def test_a_bare_membrane_is_ready_and_a_pressed_one_is_not(images, known):
 def test_a_ball_is_circled_at_its_position(images, setting, session, known):
     radius_mm = session.ball_radius_mm(session.files("balls")[0].name)
     seen = detect_open_ball(
-        images["balls"], setting, radius_mm=radius_mm, earlier_mm=[(0.0, 0.0)], editable=True
+        images["balls"],
+        setting,
+        radius_mm=radius_mm,
+        marks=press_marks([(9.0, 9.0)]),
+        editable=True,
     )
     assert seen.ready, seen.sentence
     (circle,) = seen.overlay.circles

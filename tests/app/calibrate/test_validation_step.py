@@ -108,6 +108,7 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     technician.click("calibrate.capture")
     technician.until(lambda: step._outcomes)
     assert "2 of 3: cylinder" in step.next_press.text() and not step.keep.isEnabled()
+    assert technician.state("validation") == "begun"
 
     folder = technician.session
     technician.page.leave_session()
@@ -122,8 +123,12 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     step.table.rows.choose(step._presses[2].file)
     technician.click("validation.leave_out")
     assert step.keep.isEnabled()
+    assert technician.state("validation") == "begun" and step.number().value > 0.0
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
+    assert not step.keep.isEnabled(), "this one is recorded"
+    end = technician.see("calibrate.remedy0")
+    technician.until(lambda: not end.visibleRegion().isEmpty())
     validation = read_summary(path).validation
     assert [c.name for c in validation.comparisons] == ["diameter", "height"] * 2
 
@@ -205,7 +210,8 @@ def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
     context.requests.calibrations_changed.emit()
     assert context.workspace.in_use == path
     technician.wizard.go_to("validation")
-    assert technician.see("validation.passed").text() == "Validated: 0 %. In use."
+    assert technician.see("calibrate.sentence").text() == "Validated: 0 %. In use."
+    assert context.status.value.task == "", "the state bar shows the calibration in use"
     assert [button.text() for button in panel.buttons] == ["&Inspect", "M&easure", "&Report…"]
     context.workspace.use(None)
     context.requests.calibrations_changed.emit()

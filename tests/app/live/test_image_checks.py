@@ -52,6 +52,7 @@ def test_a_dark_image_needs_a_longer_exposure(dtype):
         exposure = measure_exposure(rgb)
         assert exposure.verdict is verdict
         assert "Lengthen the exposure" in exposure.text
+        assert measure_exposure(rgb, dark=False).verdict is Verdict.PASS, "dark by design"
     spots = image(0.0, dtype)  # as of the mirror
     for k, (row, column) in enumerate(((20, 30), (60, 80), (100, 140))):
         spots[row : row + 4, column : column + 4, k] = 0.8 * np.iinfo(dtype).max
