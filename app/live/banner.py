@@ -43,8 +43,10 @@ class AdviceBanner(QWidget):
         set_names(self, "inspect.banner", "What to do next")
         self._advice: Finding | None = None
         self._idle = idle
-        self._text = named_label("inspect.advice", "Advice")
-        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._text = named_label("inspect.advice", "Advice", text="\n")
+        stretch = self._text.sizePolicy()  # with its height for a width
+        stretch.setHorizontalPolicy(QSizePolicy.Policy.Expanding)
+        self._text.setSizePolicy(stretch)
         self._button = set_names(QPushButton(), "inspect.advised", "Do this")
         self._button.clicked.connect(lambda: on_act(action_of(self._advice)))
         self._bar = set_names(QProgressBar(), "inspect.progress", "Progress")
@@ -57,9 +59,8 @@ class AdviceBanner(QWidget):
         self._row = hbox((self._line, 1), self._bar, self._stop, of=self, margins=(0, 0, 10, 0))
         self._over = over
         over.installEventFilter(self)
-        line, button = self._text.fontMetrics().lineSpacing(), self._button.sizeHint().height()
-        self.setMinimumHeight(max(2 * line, button) + 8)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        lines, button = self._text.sizeHint().height(), self._button.sizeHint().height()
+        self.setMinimumHeight(max(lines, button) + 8)
         self._working = False
         self._show()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -158,12 +157,6 @@ def box_of(surface: DisplaySurface, exaggeration: float) -> Box:
     return left, right, near, far, exaggeration * min(low, 0.0), exaggeration * high
 
 
-def round_values(low: float, high: float, step: float) -> Float64Array:
-    """Return the multiples of a step inside a range."""
-    first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
-    return np.asarray(step * np.arange(first, last + 1))
-
-
 AxesMarks = tuple[Float64Array, Float64Array, list[str]]
 # Room of a number with a gap, and the width of a letter, in sizes of a letter.
 NUMBER, LETTER = np.array([2.5, 1.25]), 0.6
@@ -172,11 +165,10 @@ NUMBER, LETTER = np.array([2.5, 1.25]), 0.6
 def draw_axes(plotter: Plotter, marks: AxesMarks | None, ink: SceneColours) -> None:
     """Draw axes with upright labels. One that would cover another one is left out. None: none."""
     _remove(plotter, "axes", "axes-labels")
-    if marks is None:
-        return
-    ends, points, texts = marks
-    lines = pv.line_segments_from_points(ends)
-    plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
+    ends, points, texts = marks or ((), (), [])
+    if marks is not None:
+        lines = pv.line_segments_from_points(ends)
+        plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
     if texts:
         centred = {"justification_horizontal": "center", "justification_vertical": "center"}
         _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
@@ -233,7 +225,7 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project
         reach = np.abs((project(middle + sides) - project(middle[None])) @ across)
         out = sides[reach.argmax()] / reach.max()
         tall, taller = (0.5 * np.abs(across) @ room for room in (NUMBER, named))
-        amounts = round_values(lowest, highest, step)
+        amounts = step * np.arange(np.ceil(lowest / step - 1e-6), highest / step + 1e-6)
         at = np.where(np.eye(3)[number], amounts[:, None] / value, start)
         ticks += [np.hstack([at, at + 0.5 * tall * out]).reshape(-1, 3)]
         beside = middle + (2.5 * tall + taller) * out

@@ -145,18 +145,17 @@ class Scene:
 
     def lay_axes(self) -> None:
         """Place the axes and their numbers for the present camera, before it is drawn."""
-        marks = self._marks() if self.style.axes else None
+        marks = self._marks()
         laid = self._ink, marks and (marks[0].tobytes(), marks[2])
         if laid != self._laid:
             self._laid = laid
             draw_axes(self._plotter, marks, self._ink)
 
     def _marks(self) -> AxesMarks | None:
-        if self.surface is None or not self.box:
+        if self.surface is None or not (self.box and self.style.axes):
             return None
         letter_px = (self._ink.font + 1) * self._plotter.render_window.GetDPI() / 72.0
-        letters = 0.5 * self._size / letter_px
-        how = self.style.exaggeration, self.surface.axis
+        letters, how = 0.5 * self._size / letter_px, (self.style.exaggeration, self.surface.axis)
         return axes_marks(self.box, *how, lambda points: letters * self._project(points))
 
     # Overlays on the surface
@@ -248,12 +247,11 @@ class Scene:
             camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
         )
         clip = np.insert(points, 3, 1.0, axis=1) @ matrix.T
-        shares: Float64Array = clip[:, :2] / clip[:, 3:]
-        return shares
+        return np.asarray(clip[:, :2] / clip[:, 3:])
 
     def _seen(self, points: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Return where points and the labels of the axes begin and end in the window."""
-        if self.style.axes and (marks := self._marks()) is not None:
+        if (marks := self._marks()) is not None:
             points = np.vstack([points, marks[1]])
         shares = self._project(points)
         return shares.min(axis=0), shares.max(axis=0)

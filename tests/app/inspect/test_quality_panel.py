@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.inspect.inspect_views import QualityPanel
+from app.inspect.inspect_views import QualityPanel, legend
 from app.live.frame_processor import FrameProcessor, FrameRequest
 from app.sources.source import SourceFrame
-from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 
 class Reconstruction:
@@ -50,3 +50,13 @@ def test_the_legend_states_the_median_misfit(dome, qtbot):
     processor.wanted = FrameRequest(quality=panel.what)
     panel.show_frame(processor(SourceFrame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), still=True)
     assert panel.map.has_image and "Median 5.0 %" in panel._legend.text()
+
+
+def test_the_legend_names_small_shares_and_breaks_no_entry():
+    flags = np.zeros((300, 300), np.uint8)
+    flags[0, 0] = Flag.DARK.value
+    flags[:30] |= Flag.SATURATED.value
+    dark, saturated = legend(flags).split("&nbsp;&nbsp; ")
+    assert dark.endswith("&lt;0.1&nbsp;%") and saturated.endswith("&nbsp;10.0&nbsp;%")
+    for entry in (dark, saturated):
+        assert " " not in entry.partition("</span>")[2]

@@ -61,3 +61,9 @@ def test_a_line_across_an_object_gives_its_step_and_its_width(marks, qtbot):
     assert line.role == panel._plot._curve.opts["pen"].color().name() == LINE_INK
     panel.show_cut(SectionResult())
     assert panel._plot._curve.getData()[0] is None
+
+
+def test_the_settings_beside_the_section_are_never_cut(qtbot):
+    panel = SectionPanel(on_changed=lambda: None, on_save=lambda: None)
+    qtbot.addWidget(panel)
+    assert panel.minimumSizeHint().height() > panel.form.minimumSizeHint().height() > 100

@@ -86,3 +86,17 @@ def test_the_true_values_of_a_known_press_are_filled_in(qtbot):
     assert changes[-1] == form.stated == ReferenceObject("cylinder", 4.0, height_mm=0.8)
     _show(form, "ball")
     assert form.stated == ReferenceObject("ball")
+
+
+def test_the_origin_of_a_reference_is_shown(qtbot):
+    form, _ = _form(qtbot)
+    _show(form, "cylinder")
+    assert form.known.currentText() == "No known object"
+    form.new_press(replace(ROD, shape="cylinder", name="Virtual bench"))
+    assert form.known.currentText() == "Virtual bench" and form.stated.size_mm == 5.0
+    form.form.change(size_mm=5.1)
+    assert form.known.currentText() == "Own values" and form.stated.name == ""
+    _choose(form, "Virtual bench")
+    assert form.stated.size_mm == 5.0
+    form.new_press()
+    assert form.known.currentText() == "No known object"

@@ -194,6 +194,17 @@ def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
     assert np.abs(_colour_at(again, hidden) - _colour_at(whole, hidden)).max() < 12
 
 
+def test_the_orientation_widget_has_one_size_on_every_screen(panel, qtbot):
+    view = panel.view
+    assert view is not None
+    for height in (600, 250):
+        before = view.height()
+        panel.resize(500, height)
+        qtbot.waitUntil(lambda before=before: view.height() != before, timeout=10_000)
+        side = round(view.devicePixelRatioF() * min(120, view.height() / 3))
+        assert tuple(view._orientation.GetRepresentation().GetSize()) == (side, side)
+
+
 @pytest.mark.function("Look from a standard direction")
 def test_a_click_on_the_orientation_widget_changes_the_view(panel, qtbot):
     panel.view_from("isometric")
