@@ -38,14 +38,14 @@ class ProcessingPanel(QWidget):
     def __init__(self, *, on_changed: Slot, on_hold: Slot) -> None:
         super().__init__()
         set_names(self, "inspect.processing", "Processing")
-        self._changed = on_changed
+        self._on_changed = on_changed
         self.reference: ReferenceMap | None = None
         self.form = Form(ProcessingSteps(), "inspect.processing")
-        self.form.changed.connect(self._on_changed)
+        self.form.changed.connect(lambda _name, _value: on_changed())
         self._subtract = set_names(
             QCheckBox("Subtract"), "inspect.processing.subtract", "Subtract the reference"
         )
-        self._subtract.toggled.connect(self._on_changed)
+        self._subtract.toggled.connect(lambda _on: on_changed())
         hold = push_button(
             "inspect.processing.hold",
             "Hold",
@@ -60,14 +60,7 @@ class ProcessingPanel(QWidget):
             text="Applies to a frozen image. Press Space to freeze it.",
             role="muted",
         )
-        self._reset = push_button(
-            "inspect.processing.reset",
-            "Reset",
-            self.reset,
-            accessible="Reset the processing",
-            tip="Show the height map as reconstructed",
-        )
-        vbox(self.form, self._state, self._reset, of=self, margins=0)
+        vbox(self.form, self._state, of=self, margins=0)
         self._show_reference()
 
     def processing(self, rectangle: Rectangle, points_mm: MaskPoints) -> ProcessingSteps:
@@ -95,7 +88,6 @@ class ProcessingPanel(QWidget):
         self._subtract.setEnabled(reference is not None)
         if reference is None:
             self._subtract.setChecked(False)
-        self._reset.setEnabled(self._does_something)
 
     def reset(self) -> None:
         """Do nothing to the height map. The reference is kept."""
@@ -107,14 +99,6 @@ class ProcessingPanel(QWidget):
     def show_still(self, still: bool) -> None:
         """Show why the choices have no effect on a live image."""
         self._state.setVisible(not still)
-
-    @property
-    def _does_something(self) -> bool:
-        return not self.form.value.does_nothing or self._subtract.isChecked()
-
-    def _on_changed(self) -> None:
-        self._reset.setEnabled(self._does_something)
-        self._changed()
 
 
 class ProcessingSummary(QWidget):

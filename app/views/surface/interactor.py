@@ -7,8 +7,6 @@ pyvista and ParaView. A left click without a drag sets a pin, a right click requ
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -38,16 +36,6 @@ SHADOW_MM = 1.5
 """Hollows of about this size are shaded in a frozen image: the size of a deep press."""
 
 
-@contextmanager
-def _no_warning_of_the_format() -> Iterator[None]:
-    """Suppress Qt's warning that pyvistaqt sets the default OpenGL format, which is already set."""
-    QLoggingCategory.setFilterRules("default.warning=false")
-    try:
-        yield
-    finally:
-        QLoggingCategory.setFilterRules("")
-
-
 class Interactor(QtInteractor):  # type: ignore[misc]
     """Shows a scene, controlled by mouse, touchpad and keys.
 
@@ -73,8 +61,10 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     menu_wanted = Signal(QPoint)
 
     def __init__(self) -> None:
-        with _no_warning_of_the_format():
-            super().__init__(None, multi_samples=0, auto_update=False, lighting="none")
+        # pyvistaqt sets the default OpenGL format, which is already set. Qt would warn of it.
+        QLoggingCategory.setFilterRules("default.warning=false")
+        super().__init__(None, multi_samples=0, auto_update=False, lighting="none")
+        QLoggingCategory.setFilterRules("")
         set_names(self, "view3d.surface", "Surface in 3D")
         self.setAcceptDrops(False)  # the window opens dropped files
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -241,12 +231,9 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         widget = self.add_camera_orientation_widget()
         representation = widget.GetRepresentation()
         # The scene's y axis points up, the sensor's down. z is depth.
-        representation.SetXPlusLabelText("x")
-        representation.SetXMinusLabelText("-x")
-        representation.SetYPlusLabelText("-y")
-        representation.SetYMinusLabelText("y")
-        representation.SetZPlusLabelText("top")
-        representation.SetZMinusLabelText("bottom")
+        ends = "XPlus", "XMinus", "YPlus", "YMinus", "ZPlus", "ZMinus"
+        for end, text in zip(ends, ("x", "-x", "-y", "y", "top", "bottom"), strict=True):
+            getattr(representation, f"Set{end}LabelText")(text)
         parts = vtkPropCollection()
         representation.GetActors(parts)
         for number in range(parts.GetNumberOfItems()):

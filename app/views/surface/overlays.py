@@ -170,8 +170,11 @@ def draw_axes(plotter: Plotter, marks: AxesMarks | None, ink: SceneColours) -> N
         lines = pv.line_segments_from_points(ends)
         plotter.add_mesh(lines, name="axes", color=ink.text, line_width=1, **PLAIN)
     if texts:
-        centred = {"justification_horizontal": "center", "justification_vertical": "center"}
-        _label(plotter, "axes-labels", points, texts, ink.font + 1, ink, bold=False, **centred)
+        how: dict[str, Any] = {
+            f"justification_{side}": "center" for side in ("horizontal", "vertical")
+        }
+        how |= {"text_color": ink.text, "bold": False}
+        _label(plotter, "axes-labels", points, texts, ink.font + 1, **how)
 
 
 def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project) -> AxesMarks:
@@ -292,7 +295,7 @@ def draw_scale_bar(plotter: Plotter, box: Box, style: DisplaySettings, ink: Scen
     line = pv.Line((box[0], y, box[4]), (box[0] + length, y, box[4]))
     plotter.add_mesh(line, name="scale-bar", color=ink.text, line_width=4, **PLAIN)
     at, text = [(box[0] + 0.5 * length, y - 0.07 * side, box[4])], [length_text(length)]
-    _label(plotter, "scale-bar-length", at, text, ink.font + 4, ink)
+    _label(plotter, "scale-bar-length", at, text, ink.font + 4, text_color=ink.text)
 
 
 def _remove(plotter: Plotter, *names: str) -> None:
@@ -306,15 +309,7 @@ def _write(plotter: Plotter, name: str, text: str, place: str, ink: SceneColours
     actor.SetMaximumFontSize(ink.font + 1)  # else the letters grow with the window
 
 
-def _label(
-    plotter: Plotter,
-    name: str,
-    points: Any,
-    texts: list[str],
-    size: int,
-    ink: SceneColours,
-    **how: Any,
-) -> None:
-    options = {"shape": None, "show_points": False, "font_size": size, "text_color": ink.text}
-    options |= {"font_file": FONT, "always_visible": True}  # the surface's shadows hide some
-    plotter.add_point_labels(points, texts, name=name, **options, **how, **QUIET)
+def _label(plotter: Plotter, name: str, at: Any, texts: list[str], size: int, **how: Any) -> None:
+    options = {"shape": None, "show_points": False, "font_size": size, "font_file": FONT}
+    # Without a test of what hides them, which fails where hollows have shadows.
+    plotter.add_point_labels(at, texts, name=name, always_visible=True, **options, **how, **QUIET)
