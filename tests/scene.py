@@ -82,7 +82,7 @@ def full_calibration(membrane: MembraneBrdf | None = None) -> Calibration:
         misfit=0.0123,
         kept="refined",
         membrane_sd={"decay_mm": 0.01, "gloss": 0.012},
-        evidence={"leds": (31.0, 4.5), "lobe": (-0.3, 1.2)},
+        worth={"leds": 0.011, "lobe": 0.0004},
         scale_sd=ScaleUncertainty(depth=0.0061, lateral=0.0002),
     )
     return replace(plain, model="full").changed(full=full)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
-from PySide6.QtWidgets import QFrame
+from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from app.widgets import theme
 from app.widgets.label import PlainLabel
-from app.widgets.layout import vbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.plots import CHANNEL_COLOURS, apply_theme, bare_plot
 from app.widgets.text_roles import make_bold, set_text_role
 from app.widgets.widget_names import set_names
@@ -27,7 +27,9 @@ from gelpolight_core.output.report.result_pictures import (
     Role,
 )
 
-HEIGHTS = {True: 260, False: 156}
+SMALL = 0.8
+"""Size of the letters in a picture, over the usual one."""
+LEAST_HEIGHTS = {True: 150, False: 100}
 """Of pictures from above, and of charts."""
 
 
@@ -47,7 +49,7 @@ class ResultPlot(QFrame):
         super().__init__()
         self.setObjectName("card")
         self.picture = picture
-        from_above = not any(picture.labels)
+        self.from_above = not any(picture.labels)
         tip = " Click a bar to open its press." if self.bar_at(0.0) else ""
         title = PlainLabel(picture.title, wrap=True)
         caption = PlainLabel(picture.caption + tip, wrap=True)
@@ -56,15 +58,18 @@ class ResultPlot(QFrame):
         self._bar: pg.ColorBarItem | None = None
         self.plot = bare_plot()
         set_names(self.plot, f"result.picture.{picture.key}", picture.title)
-        self.plot.setFixedHeight(HEIGHTS[from_above])
+        # As high as there is room.
+        self.plot.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self.plot.setMinimumHeight(LEAST_HEIGHTS[self.from_above])
         self.plot.setMouseEnabled(False, False)
-        self.plot.setLabel("bottom", "x (mm)" if from_above else picture.labels[0])
-        self.plot.setLabel("left", "y (mm)" if from_above else picture.labels[1])
-        if from_above:
+        self.plot.setLabels(**dict(zip(("bottom", "left"), picture.labels, strict=True)))
+        if self.from_above:
             self.plot.setAspectLocked(True)
             self.plot.invertY(True)
         self.plot.scene().sigMouseClicked.connect(self._click)
-        vbox(title, self.plot, caption, None, of=self, margins=(12, 8, 12, 8), spacing=4)
+        beside = hbox((self.plot, 3), (caption, 1, Qt.AlignmentFlag.AlignTop), spacing=12)
+        parts = (caption, (self.plot, 1)) if self.from_above else ((beside, 1),)
+        vbox(title, *parts, of=self, margins=(12, 8, 12, 8), spacing=4)
         self._draw()
 
     def changeEvent(self, event: QEvent) -> None:
@@ -88,26 +93,14 @@ class ResultPlot(QFrame):
         self.plot.clear()
         apply_theme(self.plot)
         self.plot.setBackground(theme.colour("alternate"))
-        if any(isinstance(mark, Line) and mark.name for mark in self.picture.marks):
-            self.plot.addLegend(offset=(-8, 8), labelTextColor=theme.colour("text"))
         for mark in self.picture.marks:
             self._add(mark)
         self.plot.autoRange(padding=0.08)
-        if any(self.picture.labels):
-            self.plot.setYRange(0.0, 1.3 * self._highest(), padding=0.0)
-
-    def _highest(self) -> float:
-        """Return the largest value that a chart shows."""
-        values = [0.0]
-        for mark in self.picture.marks:
-            match mark:
-                case Bars(_, heights, _):
-                    values += heights
-                case Line(_, y, _, _):
-                    values.append(float(np.max(y)))
-                case Level(value, _):
-                    values.append(value)
-        return max(values)
+        if not self.from_above:
+            tops = [
+                np.max(m.y, initial=0.0) for m in self.picture.marks if not isinstance(m, Field)
+            ]
+            self.plot.setYRange(0.0, 1.3 * max(tops), padding=0.0)
 
     def _add(self, mark: Mark) -> None:
         match mark:
@@ -116,23 +109,21 @@ class ResultPlot(QFrame):
                 at = np.arange(len(names))
                 bars = pg.BarGraphItem(x=at, height=values, width=0.7, brushes=brushes, pen=None)
                 self.plot.addItem(bars)
-                # Names of many bars would overlap.
-                named = zip(at, names, roles, strict=True)
-                texts = [
-                    (place, name.removeprefix("ball_"))
-                    for place, name, role in named
-                    if len(names) <= MOST_NAMES or role == "warn"
-                ]
+                # Names of many bars would overlap: the worst is named.
+                shown = names if len(names) <= MOST_NAMES else names[:1]
+                texts = [(k, name.removeprefix("ball_")) for k, name in enumerate(shown)]
                 self.plot.getAxis("bottom").setTicks([texts])
-            case Line(x, y, role, name):
-                self.plot.plot(x, y, pen=pg.mkPen(_colour(role), width=2), name=name or None)
-            case Label(x, y, text, role):
-                item = pg.TextItem(text, _colour(role), anchor=(0.5, 0.5))
+            case Line(x, y, role):
+                self.plot.plot(x, y, pen=pg.mkPen(_colour(role), width=2 - self.from_above))
+            case Label(x, y, text, role, above_end):
+                item = pg.TextItem(text, _colour(role), anchor=(1, 1) if above_end else (0.5, 0.5))
+                item.textItem.setScale(SMALL)
                 item.setPos(x, y)
                 self.plot.addItem(item)
             case Level(value, text):
                 pen = pg.mkPen(_colour("warn"), style=Qt.PenStyle.DashLine)
-                opts = {"position": 0.02, "anchors": [(0, 1), (0, 1)], "color": _colour("warn")}
+                opts = {"position": 0.5, "anchors": [(0.5, 1)] * 2, "color": _colour("warn")}
+                opts["fill"] = theme.colour("alternate")
                 self.plot.addItem(
                     pg.InfiniteLine(value, angle=0, pen=pen, label=text, labelOpts=opts)
                 )

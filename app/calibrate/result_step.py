@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
-from PySide6.QtWidgets import QGridLayout, QPushButton, QTabWidget, QWidget
+import numpy as np
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QTabWidget, QVBoxLayout, QWidget
 
 from app.program.file_dialogs import ask_save
 from app.program.jobs import BackgroundJob
@@ -30,12 +31,15 @@ from gelpolight_core.base.finding import (
     worst_of,
 )
 from gelpolight_core.base.root_causes import best_cause, cause_and_rest
-from gelpolight_core.calibration.joint_stage import JOINT, term_facts
+from gelpolight_core.calibration.calibration_file import read_calibration
+from gelpolight_core.calibration.closed_sensor_recipe import BALLS as CLOSED_BALLS
+from gelpolight_core.calibration.joint_stage import JOINT, WORTH, TermFact, term_facts
 from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
+from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
 
 from .image_panels import MapsView, most_oblique_press
 from .image_step import ImageStep
@@ -96,13 +100,20 @@ def corrective_action(
     if cause is None:
         stage = next(key for key, table in quality.items() if worst in table.figures)
         return CorrectiveAction(worst.sentence.rstrip("."), stage)
-    reflectance, step = results.get(REFLECTANCE), MENDED_IN.get(cause.key, SET_UP)
-    if cause.key == "press_radius_percent" and reflectance is not None:
-        fits = reflectance.table.agreements
-        worst_fit = max(fits, key=lambda fit: fit.radius_off_percent)
-        diameter_mm = float(f"{2.0 * worst_fit.radius_mm:.2g}")
-        return CorrectiveAction(cause.remedy, step, Path(worst_fit.name).name, diameter_mm)
-    return CorrectiveAction(cause.remedy, step)
+    odd = _odd_ball(results) if cause.key == "press_radius_percent" else ()
+    return CorrectiveAction(cause.remedy, MENDED_IN.get(cause.key, SET_UP), *odd)
+
+
+def _odd_ball(results: StageResults) -> tuple[str, float] | tuple[()]:
+    """Return the press whose ball contradicts the others most, and the diameter that fits."""
+    if (reflectance := results.get(REFLECTANCE)) is not None:
+        fit = max(reflectance.table.agreements, key=lambda fit: fit.radius_off_percent)
+        return Path(fit.name).name, float(f"{2.0 * fit.radius_mm:.2g}")
+    if (closed := results.get(CLOSED_BALLS)) is not None:
+        used = (size for size in closed.sizes if size.name not in closed.result.refused)
+        worst = max(used, key=lambda size: size.excess)
+        return worst.name, worst.proposed_mm
+    return ()
 
 
 if TYPE_CHECKING:
@@ -115,51 +126,57 @@ MAIN = ("ball_height_error_percent", "held_out_normal_deg")
 """Figures that say how good the whole calibration is; a recipe has one of them."""
 
 
-@dataclass(frozen=True, slots=True)
-class DrawnResult:
-    """What the page shows of a finished calibration, beside its figures.
-
-    Attributes
-    ----------
-    pictures : tuple of ResultPicture
-        As in the report.
-    terms : str
-        What the sensor's light needs, and what is left out, as markup.
-    earlier : str
-        The last calibration of the sensor; empty without one.
-    """
-
-    pictures: tuple[ResultPicture, ...]
-    terms: str
-    earlier: str
+Drawn = tuple[tuple["ResultPicture", ...], tuple[TermFact, ...], str]
+"""Pictures as in the report, terms, and the sensor's last calibration beside this one, if any."""
 
 
-def drawn_result(project: CalibrationProject, workspace: Workspace) -> DrawnResult:
+def drawn_result(project: CalibrationProject, workspace: Workspace) -> Drawn:
     """Return the pictures of a finished calibration, its terms, and the one before it."""
     from gelpolight_core.output.report.result_pictures import result_pictures  # slow to import
 
     run = project.finish()
-    c, terms, earlier = run.calibration, "", ""
-    if (joint := run.results.get(JOINT)) is not None:
-        facts = term_facts(joint.full)
-        for title, wanted in (("What this sensor needs", True), ("Left out", False)):
-            rows = [
-                f"<br>{escaped(f'{name}: {text}')}"
-                for name, text, needed in facts
-                if needed is wanted
-            ]
-            terms += f"<h4>{title}</h4>{''.join(rows).removeprefix('<br>')}" if rows else ""
+    c, joint, earlier = run.calibration, run.results.get(JOINT), ""
     for entry in workspace.entries():
         summary = entry.summary
         if summary is None or entry.serial != c.serial or summary.inputs == c.provenance.inputs:
             continue
-        figure = main_figure(summary.quality.values())
-        if figure is not None:
-            earlier = (
-                f"Last calibration of this sensor, {summary.created[:10]}: {figure.value_text}"
-            )
+        figure, made = main_figure(summary.quality.values()), entry.created
+        if figure is not None and made is not None:
+            changes = ", ".join(changes_since(read_calibration(entry.path), c))
+            earlier = f"{made.astimezone():%-d %b}: {figure.value_text}, {changes}"
             break
-    return DrawnResult(result_pictures(c, run), terms, earlier)
+    terms = () if joint is None else term_facts(joint.full)
+    return result_pictures(c, run), terms, earlier
+
+
+def changes_since(last: Calibration, c: Calibration) -> Iterator[str]:
+    """Yield how far the LEDs and the light of the untouched membrane are from the last ones."""
+    if isinstance(last.data, OpenSensor) and isinstance(c.data, OpenSensor):
+        before_mm, now_mm = ((d.full or d).led_positions_mm for d in (last.data, c.data))
+        far_um = 1e3 * float(np.linalg.norm(now_mm - before_mm, axis=1).max())
+        yield f"LEDs within {far_um:.2g} \N{MICRO SIGN}m"
+    before, now = (float(np.nanmedian(x.data.background)) for x in (last, c))
+    yield f"light {100.0 * (now / before - 1.0):+.1f} %"
+
+
+def terms_markup(facts: Iterable[TermFact]) -> str:
+    """Return the terms that the sensor's light needs, and those left out, with their worth."""
+    rows = {True: "", False: ""}
+    for fact in facts:
+        rows[bool(fact.values)] += (
+            f"<tr><td width='97%'>{escaped(fact.name)}</td><td width='1%' align='right'"
+            f" style='white-space: nowrap'>{escaped(fact.worth)}</td></tr>"
+        )
+        if fact.values:
+            rows[True] += (
+                f"<tr><td colspan='2' style='color: @muted'>{escaped(fact.values)}</td></tr>"
+            )
+    markup = "".join(
+        f"<h4>{title}</h4><table width='100%' cellspacing='2'>{rows[is_needed]}</table>"
+        for title, is_needed in (("What this sensor needs", True), ("Left out", False))
+        if rows[is_needed]
+    )
+    return f"{markup}<p style='color: @muted'>{WORTH}.</p>"
 
 
 def main_figure(tables: Iterable[QualityTable]) -> Finding | None:
@@ -181,38 +198,29 @@ class VerdictOverview(QWidget):
         self.more.toggled.connect(self.every.setVisible)
         self.every.hide()
         self.plots: tuple[ResultPlot, ...] = ()
-        self.terms = set_names(MarkupLabel(wrap=True), "result.terms", "Terms of the light")
-        self.earlier = named_label("result.earlier", "Last calibration", role="muted")
-        self._pictures, inside = QGridLayout(), QWidget()
-        self._pictures.setSpacing(16)
-        parts = self.poor, self._pictures, self.terms, hbox(self.more, None), self.every, None
-        vbox(*parts, of=inside, margins=0, spacing=16)
+        self._charts, self._maps, inside = QVBoxLayout(), QHBoxLayout(), QWidget()
+        parts = self.poor, self.every, (self._charts, 4), (self._maps, 3)
+        vbox(*parts, of=inside, margins=0, spacing=12)
         scroll = set_names(scroll_area(inside), "result.scroll", "Figures")
-        vbox(self.headline, self.earlier, (scroll, 1), of=self, margins=24, spacing=12)
+        head = hbox((self.headline, 1), self.more)
+        vbox(head, (scroll, 1), of=self, margins=16, spacing=12)
 
-    def show_result(self, drawn: DrawnResult, chosen: Callable[[str], object]) -> None:
-        """Show these pictures and texts in place of the last ones: maps are two in a row."""
+    def show_pictures(
+        self, pictures: Iterable[ResultPicture], chosen: Callable[[str], object]
+    ) -> None:
+        """Show these pictures in place of the last ones: charts, and below them plans in a row."""
         for plot in self.plots:
             plot.deleteLater()
-        self.plots = tuple(map(ResultPlot, drawn.pictures))
-        row, column = 0, 0
+        self.plots = tuple(map(ResultPlot, pictures))
         for plot in self.plots:
             plot.chosen.connect(chosen)
-            wide = any(plot.picture.labels)
-            self._pictures.addWidget(plot, row, column, 1, 2 if wide else 1)
-            column = 0 if wide else 1 - column
-            row += column == 0
-        self.terms.setText(drawn.terms)
-        self.terms.setVisible(bool(drawn.terms))
-        self.earlier.setText(drawn.earlier)
-        self.earlier.setVisible(bool(drawn.earlier))
+            (self._maps if plot.from_above else self._charts).addWidget(plot)
 
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
         """Show the figures of stages by their titles, the poor ones first, `cause` only once."""
         figures = join_quality_tables(table for _, table in tables).figures
-        severity = list(Verdict)
-        by_severity = sorted(figures, key=lambda f: -severity.index(f.verdict))
-        poor = [f for f in by_severity if f.verdict is not Verdict.PASS]
+        severity, unsorted = list(Verdict), (f for f in figures if f.verdict is not Verdict.PASS)
+        poor = sorted(unsorted, key=lambda f: -severity.index(f.verdict))
         poor_figures = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
         self.poor.set_table(QualityTable(tuple(poor_figures)))
         self.poor.setVisible(bool(poor))
@@ -236,13 +244,16 @@ class ResultStep(Step):
 
     def build(self) -> None:
         """Create what only this step shows."""
-        self._drawn: object = None
+        self._drawn, self._earlier = cast(object, None), ""
         self.overview = VerdictOverview()
+        self.terms = set_names(MarkupLabel(wrap=True), "result.terms", "Terms of the light")
         self.save = push_button("result.save", "&Save the calibration", self.store)
         self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
         self.saved = named_label("result.saved", "Where it was saved", role="pass")
         foot = self.saved, self.report, self.save
         self.own = tuple(map(self.panel.add_foot, foot))
+        if JOINT.key in self.model.statuses:
+            self.own += (self.panel.add_extra("Terms of the light model", self.terms),)
         self.tabs = set_names(QTabWidget(documentMode=True), "result.tabs", "Result")
         self.tabs.addTab(self.overview, "Verdict")
         if REFLECTANCE.key in self.model.statuses:
@@ -285,6 +296,10 @@ class ResultStep(Step):
     def number(self) -> Finding | None:
         """Return the figure of the whole calibration."""
         return main_figure(status.quality for status in self.model.statuses.values())
+
+    def progress_line(self) -> str:
+        """Return the last calibration of the sensor."""
+        return self._earlier
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Return buttons that correct the one cause: enter the number, or go to the step."""
@@ -349,8 +364,14 @@ class ResultStep(Step):
             return
         self._drawn = last
         work = partial(drawn_result, self.project, self.context.workspace)
-        done = partial(self.overview.show_result, chosen=self._open_press)
-        self.model.short_jobs.submit(BackgroundJob("Drawing", lambda _progress: work(), done))
+        job = BackgroundJob("Drawing", lambda _progress: work(), self._show_result)
+        self.model.short_jobs.submit(job)
+
+    def _show_result(self, drawn: Drawn) -> None:
+        pictures, terms, self._earlier = drawn
+        self.overview.show_pictures(pictures, self._open_press)
+        self.terms.setText(terms_markup(terms))
+        self.model.update_page(below=self.progress_line())
 
     def _open_press(self, stem: str) -> None:
         """Show the ball press of this name in its step."""
@@ -378,38 +399,31 @@ class ResultStep(Step):
 
     def _verdict(self, statuses: dict[str, StageStatus]) -> tuple[str, str]:
         """Return the verdict in one line, with its colour."""
-        states = [status.state for status in statuses.values()]
-        figures = join_quality_tables(status.quality for status in statuses.values()).figures
-        warnings = sum(figure.verdict is Verdict.WARN for figure in figures)
-        failed_titles = [
-            self._title(key) for key, status in statuses.items() if status.state is FAIL
-        ]
-        is_complete = all(map(_is_made, statuses.values()))
-        if is_complete and failed_titles:
-            return f"Failed: {', '.join(failed_titles)}", "fail"
-        if is_complete and warnings:
-            return f"Usable. Figures with a warning: {warnings}", "warn"
-        if is_complete:
+        if all(map(_is_made, statuses.values())):
+            failed = ", ".join(self._title(k) for k, s in statuses.items() if s.state is FAIL)
+            if failed:
+                return f"Failed: {failed}", "fail"
+            figures = join_quality_tables(status.quality for status in statuses.values()).figures
+            if warnings := sum(figure.verdict is Verdict.WARN for figure in figures):
+                return f"Usable. Figures with a warning: {warnings}", "warn"
             return f"Passed: all {len(figures)} figures are within their limits.", "pass"
         if self.model.jobs.busy and self.model.saved:
             return "Saved. You can validate it now; the stages are computed again.", ""
         if self.model.jobs.busy:
             return "Computing. Please wait.", ""
-        if OUTDATED in states:
-            count = sum(not is_done(state.value) for state in states)
+        count = sum(not is_done(status.state.value) for status in statuses.values())
+        if any(status.state is OUTDATED for status in statuses.values()):
             text = f"Outdated stages: {count}. The captures have changed. Click Recompute."
             return text, "stale"
-        return self._missing(statuses), ""
+        return f"Incomplete stages: {count}. {self._missing(statuses)}", ""
 
     def _missing(self, statuses: dict[str, StageStatus]) -> str:
-        """Return the number of missing stages, and the titles of those for the open sensor."""
-        open_count = sum(not is_done(status.state.value) for status in statuses.values())
-        text = f"Incomplete stages: {open_count}. Complete them from top to bottom."
-        recipe, empty = self.project.recipe, StageState.EMPTY
+        """Return what to do, with the titles of missing stages that need the open sensor."""
+        text = "Complete them from top to bottom."
         open_titles = [
-            recipe[key].title
+            self._title(key)
             for key, status in statuses.items()
-            if recipe[key].folder in OPEN_FOLDERS and status.state is empty
+            if self.project.recipe[key].folder in OPEN_FOLDERS and status.state is StageState.EMPTY
         ]
         if open_titles and TOP_POSE.key in statuses:
             text += (

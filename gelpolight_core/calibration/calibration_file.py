@@ -56,8 +56,8 @@ OLDER_INTERREFLECTION_SD = 0.03
 """Of the height, share. Older files hold the share of the neighbourhood's light that came back: it
 is near the membrane's reflectance, but not equal to it."""
 
-OLDER_CHOICES = {"held_out", "membrane_held_out", "membrane_kept"}
-"""Errors of held-out presses with two LEDs or membranes, in files of earlier programs."""
+OLDER_CHOICES = {"held_out", "membrane_held_out", "membrane_kept", "evidence"}
+"""What held-out presses said of LEDs, membrane and terms, in files of earlier programs."""
 
 IN_PLACE_ARRAYS = {
     "background": "in_place.background",

@@ -182,7 +182,7 @@ def refine_jointly(
         misfit=solved.misfit,
         kept="refined" if LEDS.key in used else "mirror",
         membrane_sd={p.full_key: sd[p.full_key] for p in shared[led_positions_mm.size :]},
-        evidence={key: evidence[key][1:] for key in OPTIONAL if key in evidence},
+        worth={key: evidence[key].worth for key in OPTIONAL if key in evidence},
     )
     return JointRefinement(
         full,
@@ -235,8 +235,10 @@ class _Sensor:
         found_of_curved = needed_terms(other, choice)
         fall = compared(linear.left(used_of(found)), other.left(used_of(found_of_curved)))
         if fall.sure and linear.held_out:
-            return curved, {**found_of_curved, GLOSSY.key: fall._replace(gain=-fall.gain)}
-        return glossy, {**found, CURVED.key: fall}
+            gloss = linear.evidence(GLOSSY.key, used_of(found_of_curved))
+            gloss = fall._replace(gain=-fall.gain, worth=gloss.worth)
+            return curved, {**found_of_curved, GLOSSY.key: gloss}
+        return glossy, {**found, CURVED.key: fall._replace(worth=curves.worth)}
 
     def solved(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from .open_ball_stages import REFLECTANCE
 from .open_sensor_recipe import led_facts
@@ -37,37 +37,47 @@ def _joint_facts(c: OpenSensor) -> Facts:
             (name, f"{led}, shifted by {shift}")
             for (name, led), shift in zip(leds, shifts, strict=True)
         ),
-        *((name, text) for name, text, _ in term_facts(full)),
+        *((f.name, f"{f.worth}; {f.values or 'left out'}") for f in term_facts(full)),
+        ("Figures of terms", WORTH),
     )
 
 
-def term_facts(full: FullModel) -> tuple[tuple[str, str, bool], ...]:
-    """Return each term with its values and what it is worth, and whether it is needed."""
+WORTH = "How far a term changes the calculated light of the presses (rms), all else fitted again"
+"""The meaning of the figures of terms."""
+
+
+class TermFact(NamedTuple):
+    """A term of the light with what it is worth, and its values; without them it is left out."""
+
+    name: str
+    worth: str
+    values: str
+
+
+def term_facts(full: FullModel) -> tuple[TermFact, ...]:
+    """Return the terms that were tried, those that change the light most first."""
     from .refinement_parameters import TERMS
 
-    membrane = full.membrane
+    membrane, sd = full.membrane, full.membrane_sd
     values = {
         "gloss": membrane.gloss,
         "roughness": membrane.roughness,
         "interreflection": membrane.interreflection,
         **membrane.terms,
     }
+    tried = [term for term in TERMS if term.key in full.worth and term.parameters]
     facts = []
-    for term in TERMS:
-        if term.key not in full.evidence or not term.parameters:
-            continue
-        gain, scatter = full.evidence[term.key]
-        change = "falls" if gain > 0.0 else "rises"
-        size, sd = (f"{v:,.0f}" if abs(v) >= 100.0 else f"{v:.2g}" for v in (abs(gain), scatter))
-        worth = f"chi square of held-out presses {change} by {size} (sd {sd})"
+    for term in sorted(tried, key=lambda term: -full.worth[term.key]):
+        percent = f"{100.0 * full.worth[term.key]:.1f} %"
         fitted = [
-            f"{p.name} {values[p.full_key]:.3g} (sd {full.membrane_sd[p.full_key]:.2g})"
+            f"{p.name} {values[p.full_key]:.3g} \N{PLUS-MINUS SIGN} {sd[p.full_key]:.2g}"
             for p in term.parameters
-            if p.full_key in full.membrane_sd and p.full_key in values
+            if p.full_key in sd and p.full_key in values
         ]
-        is_needed = term.parameters[0].full_key in full.membrane_sd
-        parts = (*fitted, worth) if is_needed else ("not clearly needed", worth)
-        facts.append((term.name[0].upper() + term.name[1:], "; ".join(parts), is_needed))
+        worth = "< 0.1 %" if percent == "0.0 %" else percent
+        if term.parameters[0].full_key in sd and not fitted:
+            fitted = [f"{len(term.parameters)} values"]
+        facts.append(TermFact(term.name[0].upper() + term.name[1:], worth, "; ".join(fitted)))
     return tuple(facts)
 
 

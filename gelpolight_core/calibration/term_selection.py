@@ -8,7 +8,7 @@ LEDs, balls or terms needs a fit of its own.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from gelpolight_core.base.arrays import Float64Array
 from gelpolight_core.light.parameter import Parameter
 from gelpolight_core.stages.balls.press_agreement import LEAST_PRESSES
 
+from .refinement_kernel import CORRELATION
 from .refinement_parameters import LEDS, OPTIONAL, TERMS
 from .refinement_problem import JointProblem
 
@@ -36,11 +37,15 @@ class TermEvidence(NamedTuple):
         left out, or fall if it is added.
     scatter : float
         Standard deviation of this gain, from its scatter between presses.
+    worth : float
+        Change of the calculated light of the presses (rms, share of the light of the untouched
+        membrane) between the fits with and without it, in which all else is fitted again.
     """
 
     used: bool
     gain: float
     scatter: float
+    worth: float = 0.0
 
     @property
     def sure(self) -> bool:
@@ -49,11 +54,15 @@ class TermEvidence(NamedTuple):
 
 
 class _PressEquations(NamedTuple):
-    """Normal equations of each press without its ball: (N, n, n), (N, n), and (N,) at x."""
+    """Normal equations of each press without its ball: (N, n, n), (N, n), and (N,) at x.
+
+    `light` (N, n, n) gives the mean square change of its light by that of the parameters.
+    """
 
     curvature: Float64Array
     gradient: Float64Array
     square: Float64Array
+    light: Float64Array
 
 
 class LinearTerms:
@@ -85,13 +94,15 @@ class LinearTerms:
         ends = np.cumsum([r.size for r in residuals])
         parts = np.split(jacobian, ends)
         own = [balls[[problem.parameters[i].press == k for i in balls]] for k in range(len(ends))]
+        weights = [press.weight.ravel() for press in problem.presses]
         equations = [
-            _without_ball(part[:, free], part[:, ball], residual)
-            for part, ball, residual in zip(parts[:-1], own, residuals, strict=True)
+            _without_ball(part[:, free], part[:, ball], residual, known)
+            for part, ball, residual, known in zip(parts[:-1], own, residuals, weights, strict=True)
         ]
         self.presses = _PressEquations(*(np.array(part) for part in zip(*equations, strict=True)))
         prior, left = parts[-1][:, free], problem.priors(x)
-        self._prior = prior.T @ prior, prior.T @ left
+        summed = self.presses.curvature.sum(axis=0), self.presses.gradient.sum(axis=0)
+        self._total = summed[0] + prior.T @ prior, summed[1] + prior.T @ left
 
     @property
     def held_out(self) -> bool:
@@ -100,8 +111,10 @@ class LinearTerms:
 
     def evidence(self, key: str, used: Collection[str]) -> TermEvidence:
         """Return what held-out presses say of a term, beside those in use."""
-        without, with_it = (self.left(keys) for keys in ({*used} - {key}, {*used, key}))
-        found = compared(without, with_it)._replace(used=key in used)
+        sets = {*used} - {key}, {*used, key}
+        change = np.subtract(*map(self._step, sets))
+        worth = float(np.sqrt(change @ self.presses.light.mean(axis=0) @ change))
+        found = compared(*map(self.left, sets))._replace(used=key in used, worth=worth)
         return found if self.held_out else found._replace(scatter=SURE)
 
     def left(self, used: Collection[str]) -> Float64Array:
@@ -114,20 +127,22 @@ class LinearTerms:
         used : collection of str
             Keys of these terms and lengths; the others are neutral, or as they are stated.
         """
+        left = self.presses.square.copy()
+        for k, (curvature, gradient, _, _) in enumerate(zip(*self.presses, strict=True)):
+            step = self._step(used, *[(curvature, gradient)] * self.held_out)
+            left[k] += 2.0 * gradient @ step + step @ curvature @ step
+        return left
+
+    def _step(self, used: Collection[str], less: Sequence[Any] = (0.0, 0.0)) -> Float64Array:
+        """Return the change (n,) to the fit with some optional terms, without some equations."""
         choices = {*OPTIONAL, *self.stated}
         free = np.array([term in used or term not in choices for term in self._terms])
-        fixed = np.where(free, 0.0, self._to_neutral)
-        curvature, gradient, square = self.presses
-        left = np.empty(len(square))
-        total, slope = curvature.sum(axis=0) + self._prior[0], gradient.sum(axis=0) + self._prior[1]
-        for k in range(len(square)):
-            a, b = (total - curvature[k], slope - gradient[k]) if self.held_out else (total, slope)
-            step = fixed.copy()
-            step[free] = -np.linalg.lstsq(
-                a[np.ix_(free, free)], b[free] + a[free] @ fixed, rcond=None
-            )[0]
-            left[k] = square[k] + 2.0 * gradient[k] @ step + step @ curvature[k] @ step
-        return left
+        a, b = (whole - part for whole, part in zip(self._total, less, strict=True))
+        step = np.where(free, 0.0, self._to_neutral)
+        step[free] = -np.linalg.lstsq(a[np.ix_(free, free)], b[free] + a[free] @ step, rcond=None)[
+            0
+        ]
+        return step
 
 
 def used_of(evidence: Mapping[str, TermEvidence]) -> set[str]:
@@ -149,17 +164,19 @@ def _neutral(parameter: Parameter) -> float:
 
 
 def _without_ball(
-    shared: Float64Array, ball: Float64Array, residual: Float64Array
-) -> tuple[Float64Array, Float64Array, float]:
+    shared: Float64Array, ball: Float64Array, residual: Float64Array, known: Float64Array
+) -> tuple[Float64Array, Float64Array, float, Float64Array]:
     """Return the normal equations of a press, of which the ball follows the shared parameters.
 
-    With soft L1, larger residuals have less weight.
+    With soft L1, larger residuals have less weight, beside what is known of the pixels.
     """
-    weight = (1.0 + residual**2) ** -0.25
+    weight, usable = (1.0 + residual**2) ** -0.25, residual != 0.0
     shared, ball, residual = weight[:, None] * shared, weight[:, None] * ball, weight * residual
     basis, _ = np.linalg.qr(ball)
     shared, residual = shared - basis @ (basis.T @ shared), residual - basis @ (basis.T @ residual)
-    return shared.T @ shared, shared.T @ residual, float(residual @ residual)
+    light = CORRELATION * shared[usable] / (weight * known)[usable, None]
+    mean_square = light.T @ light / max(len(light), 1)
+    return shared.T @ shared, shared.T @ residual, float(residual @ residual), mean_square
 
 
 def needed_terms(linear: LinearTerms, candidates: Sequence[str]) -> dict[str, TermEvidence]:

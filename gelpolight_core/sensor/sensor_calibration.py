@@ -158,9 +158,10 @@ class FullModel:
     membrane_sd : mapping
         Standard deviations of the parameters refined with the LEDs, by their names: those of the
         terms in use, and the decay length. Empty in files of version 1.
-    evidence : mapping
-        For each term that was tried, by its key: how much it lowers the squared residuals of
-        held-out presses, and the scatter of that.
+    worth : mapping
+        For each term that was tried, by its key: by which share of the untouched membrane's light
+        the calculated light of the ball presses changes (rms) if only this term is left out, or
+        added, and all else is fitted again.
     scale_sd : ScaleUncertainty or None
         Uncertainty of the lengths; None in calibrations by programs that did not estimate it.
     older_reach_mm : float or None
@@ -175,7 +176,7 @@ class FullModel:
     misfit: float
     kept: str
     membrane_sd: Mapping[str, float] = field(default_factory=dict)
-    evidence: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    worth: Mapping[str, float] = field(default_factory=dict)
     scale_sd: ScaleUncertainty | None = None
     older_reach_mm: float | None = None
 
@@ -188,7 +189,7 @@ class FullModel:
             With the first of them.
         """
         self.membrane.check()
-        figures = [self.misfit, *self.membrane_sd.values()]
+        figures = [self.misfit, *self.membrane_sd.values(), *self.worth.values()]
         if self.scale_sd is not None:
             figures += [self.scale_sd.depth, self.scale_sd.lateral, self.scale_sd.balls]
         if min(figures) < 0.0 or self.decay_mm <= 0.0:

@@ -145,8 +145,9 @@ FALLING[1, 100] = FALLING[1, 90]
         {"data/full/kept": "guess"},
         {"data/full/decay_mm": -1.0},
         {"data/full/misfit": -0.1},
-        {"data/full/evidence": {"lobe": [float("nan"), 1.0]}},
-        {"data/full/evidence": {"lobe": [1.0]}},
+        {"data/full/worth": {"lobe": float("nan")}},
+        {"data/full/worth": {"lobe": [1.0]}},
+        {"data/full/worth": {"lobe": -0.1}},
         {"data/full/membrane/terms": {"stretch_loss": 1.5}},
         {"data/full/membrane/terms": {"stretch_loss": float("nan")}},
         {"data/full/membrane/terms": {**TERMS, "absorption_per_mm_red": -0.001}},
@@ -214,7 +215,7 @@ def test_a_full_model_of_version_1_is_read(tmp_path):
     read = read_calibration(forged(OLDER, tmp_path / "old.gplcal", older))
     assert read.data.full.membrane == usual.membrane
     assert read.data.full.membrane.terms == {}
-    assert read.data.full.evidence == {}
+    assert read.data.full.worth == {}
     assert read.provenance.edits == ()
 
 
@@ -228,14 +229,15 @@ def test_what_earlier_programs_chose_is_read_and_the_calibration_is_the_same(tmp
         "data/full/held_out": [0.031, 0.0134],
         "data/full/membrane_held_out": [0.0134, 0.0129],
         "data/full/membrane_kept": "one-dimensional",
-        "data/full/evidence": GONE,
+        "data/full/evidence": {"lobe": [3.0, 1.0]},
+        "data/full/worth": GONE,
         "data/full/membrane/terms": GONE,
         "data/sensor/led_half_angle_deg": GONE,
     }
     read = read_calibration(forged(path, tmp_path / "older.gplcal", older))
     assert read.identity == plain.identity
     assert read.data.full.membrane == plain.data.full.membrane
-    assert read.data.full.evidence == {}
+    assert read.data.full.worth == {}
     before = read_calibration(OLDER)
     assert before.data.full.kept == "refined"
     assert before.identity == read_summary(OLDER).identity

@@ -229,8 +229,10 @@ def test_leds_that_are_not_at_the_housings_height_are_found():
     assert not result.full.membrane.diffuse
     assert not result.full.membrane.terms
     assert result.full.membrane.interreflection == 0.0
-    gain, scatter = result.full.evidence["gloss"]
-    assert gain > 3.0 * scatter > 0.0
+    gloss = result.evidence["gloss"]
+    assert gloss.gain > 3.0 * gloss.scatter > 0.0
+    # Of the light of the presses, this membrane's gloss is far above the noise.
+    assert result.full.worth["gloss"] > 0.01 > 0.003 > result.full.worth["stretch"]
     assert result.full.misfit == pytest.approx(0.003, rel=0.2)
     # Pixel errors are correlated, as from lens and ball; weights allow for 1 % of noise at least.
     found, of = result.full, result.full.membrane_sd
@@ -311,7 +313,8 @@ def test_an_ideal_sensor_needs_no_term():
     assert result.full.membrane.terms == {}
     assert set(result.full.membrane_sd) == {"decay_mm"}
     # Nothing was taken for granted: every term was tried.
-    assert set(result.full.evidence) == set(OPTIONAL)
+    assert set(result.full.worth) == set(OPTIONAL)
+    assert max(result.full.worth.values()) < 0.003  # of noise
 
 
 def test_one_press_that_is_not_a_ball_does_not_decide():

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration.refinement_kernel import CORRELATION
 from gelpolight_core.calibration.refinement_parameters import (
     DECAY,
     GLOSS,
@@ -22,6 +24,8 @@ CANDIDATES = ("gloss", "interreflection", "stretch")
 NEUTRAL = np.array([0.7, 0.0, 0.5, 0.0, 0.0])
 BALL = ("ball_x_mm", "ball_y_mm", "ball_depth_mm")
 NOISE = 0.05
+LIGHT = 0.02
+"""Share of the light that a residual of 1 stands for."""
 
 
 @dataclass
@@ -32,6 +36,10 @@ class LinearPresses:
     seen: list[np.ndarray]
     prior: np.ndarray
     stated: tuple[str, ...] = ()
+
+    @property
+    def presses(self) -> list[SimpleNamespace]:
+        return [SimpleNamespace(weight=np.full(b.size, CORRELATION / LIGHT)) for b in self.seen]
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -155,3 +163,22 @@ def test_the_linear_problem_leaves_what_a_fit_without_each_press_leaves(used):
     # Large residuals count less, by 0.2 % for this noise.
     left = LinearTerms(problem, x).left(used)
     np.testing.assert_allclose(left, expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("key", ["stretch", "gloss"])
+def test_a_term_is_worth_the_light_that_changes_between_fits_with_and_without_it(key):
+    """Of a term in use, and of one that is left out."""
+    problem, used = presses(6, stretch_loss=0.05), {"stretch"}
+    columns = {"gloss": [1, 2], "stretch": [4]}
+    light = []
+    for keys in (used | {key}, used - {key}):
+        free = [0, *(c for k in keys for c in columns[k]), *range(5, 5 + 3 * 6)]
+        slopes, x = np.concatenate(problem.slopes), np.append(NEUTRAL, np.zeros(18))
+        fixed = [c for c in range(5) if c not in free]
+        x[fixed] = NEUTRAL[fixed]
+        goal = np.concatenate(problem.seen) - slopes[:, fixed] @ x[fixed]
+        x[free] = np.linalg.lstsq(slopes[:, free], goal, rcond=None)[0]
+        light.append(LIGHT * slopes @ x)
+    expected = np.sqrt(np.mean((light[0] - light[1]) ** 2))
+    found = LinearTerms(problem, problem.solution()).evidence(key, used)
+    assert found.worth == pytest.approx(expected, rel=0.02)

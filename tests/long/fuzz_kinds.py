@@ -132,7 +132,7 @@ def _calibrations(folder: Path) -> tuple[bytes, ...]:
     leds = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
     full = FullModel(
         leds, np.full((3, 3), 0.1), MembraneBrdf(terms={"stretch_loss": 0.1}), light, 1.0, 0.01,
-        "refined", evidence={"stretch": (3.0, 1.0)},
+        "refined", worth={"stretch": 0.01},
     )  # fmt: skip
     edit = ManualEdit("reflectance", ("red",), "2026-01-02T03:04:05+00:00", "someone")
     quality = {"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))}

@@ -214,13 +214,13 @@ def _joint(c: OpenSensor, run: CalibrationRun | None, _: Colours) -> dict[str, P
 
 
 def _closed(c: ClosedSensor, run: CalibrationRun | None, _: Colours) -> dict[str, Parts]:
-    contacts, errors = drawings.contacts(c), drawings.slope_errors(c)
+    errors = drawings.slope_errors(c)
     if run is None:
-        return {"balls": ((contacts,), ()), "in_place": ((errors,), ())}
+        return {"in_place": ((errors,), ())}
     result = run.results[closed_sensor_recipe.BALLS].result
     learning = (drawings.learning(result.learning),) if len(result.learning) > 1 else ()
     return {
-        "balls": ((contacts,), (refused_presses(result),)),
+        "balls": ((), (refused_presses(result),)),
         "in_place": ((errors, *learning), (closed_presses(c, result),)),
     }
 

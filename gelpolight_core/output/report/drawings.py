@@ -220,13 +220,12 @@ def result_picture(figure: Figure, picture: ResultPicture) -> str:
     for mark in picture.marks:
         _paint_mark(axes, mark)
     axes.set(title=picture.title, xlabel=picture.labels[0], ylabel=picture.labels[1])
-    if any(isinstance(mark, Line) and mark.name for mark in picture.marks):
-        axes.legend(loc="upper right")
     if any(picture.labels):
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])  # room for the text of a limit
     else:
-        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
-        axes.invert_yaxis()
+        axes.margins(0.15)
+        top_down = sorted(axes.get_ylim(), reverse=True)
+        axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)", ylim=top_down)
     return picture.caption.rstrip(".")
 
 
@@ -236,14 +235,15 @@ def _paint_mark(axes: Axes, mark: Mark) -> None:
             at = range(len(names))
             axes.bar(at, values, 0.7, color=[ROLE_COLOURS[role] for role in roles])
             axes.set_xticks(at, map(printable, names), rotation=90.0 if len(names) > 12 else 0.0)
-        case Line(x, y, role, name):
-            axes.plot(x, y, color=ROLE_COLOURS[role], lw=1.0, label=name or None)
-        case Label(x, y, text, role):
-            axes.text(x, y, printable(text), color=ROLE_COLOURS[role], ha="center", va="center")
+        case Line(x, y, role):
+            axes.plot(x, y, color=ROLE_COLOURS[role], lw=1.0)
+        case Label(x, y, text, role, above_end):
+            ha, va = ("right", "bottom") if above_end else ("center", "center")
+            axes.text(x, y, printable(text), color=ROLE_COLOURS[role], ha=ha, va=va)
         case Level(value, text):
             axes.axhline(value, color=ROLE_COLOURS["warn"], ls="--", lw=0.8)
-            place = (0.01, value)
-            axes.annotate(text, place, xycoords=("axes fraction", "data"), va="bottom")
+            half = ("axes fraction", "data")
+            axes.annotate(text, (0.5, value), xycoords=half, ha="center", va="bottom")
         case Field(values, (left, right, top, bottom), reach):
             extent, colours = (left, right, bottom, top), ListedColormap(DIVERGING / 255.0)
             image = axes.imshow(values, extent=extent, cmap=colours, vmin=-reach, vmax=reach)
@@ -390,19 +390,6 @@ def _paint_curve(axes: Axes, table: ReflectanceTable, channel: int) -> None:
     axes.plot(cosine, covered, color=colour, lw=1.8, label="measured")
     title = f"{CHANNEL_KEYS[channel]}: measured from {low:.2f} to {high:.2f}"
     axes.set_title(title, fontsize=7.0, color=colour)
-
-
-@drawing(90.0, 120.0)
-def contacts(figure: Figure, c: ClosedSensor) -> str:
-    """Show the untouched membrane of a closed sensor with the contact of each press."""
-    grid = c.in_place.grid
-    axes = figure.subplots()
-    extent = grid_extent(MembraneGrid(grid.x_mm, grid.y_mm, grid.pitch_mm))
-    show_image(axes, c.in_place.background, extent=extent)
-    for _, x, y, contact, _ in c.balls:
-        axes.add_patch(Circle((x, y), contact, fill=False, color=ACCENT, lw=0.7))
-    axes.set(xlim=extent[:2], ylim=extent[2:])
-    return "The untouched membrane and the contact of each press that was used"
 
 
 @drawing(52.0, 110.0)

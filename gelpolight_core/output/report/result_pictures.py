@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import PurePath
 from typing import Literal, NamedTuple
 
@@ -38,47 +38,47 @@ DIVERGING = np.concatenate(
 LED_ROLES: tuple[Role, ...] = ("red", "green", "blue")
 DEPTHS_MM = np.geomspace(0.1, 1.5, 40)
 """Depths for which the uncertainty is predicted."""
-CYLINDER_MM, BALL_MM = 5.0, 10.0
-"""Objects for which it is predicted, on open and on closed sensors: the size hardly matters."""
-INWARDS = 0.78
-"""Place of an LED's text between the middle and the LED."""
+SIZES_MM = (3.0, 7.0)
+"""Smallest and largest object for which it is predicted: the size hardly matters."""
+TEXT_SHARE = 0.2
+"""Height of a line of text over that of a small chart; a plan is twice as high."""
 MOST_NAMES = 20
 """Presses that are named in a picture. Chosen: names of more would overlap."""
-BOARDS = "Grey: corners of the board on the top surface."
+BOARDS = "Grey: board on the top surface."
 ELLIPSE_MM = 1.0
-"""Length of the largest half axis of the drawn uncertainty of an LED."""
+"""Length of the largest half axis of the drawn uncertainty of an LED. Its text is beside it."""
 
 
 class Bars(NamedTuple):
     """Bars side by side, with the role of each."""
 
     names: tuple[str, ...]
-    values: tuple[float, ...]
+    y: tuple[float, ...]
     roles: tuple[Role, ...]
 
 
 class Line(NamedTuple):
-    """A line through points; with a name, it is in the legend."""
+    """A line through points."""
 
     x: Float64Array
     y: Float64Array
     role: Role
-    name: str = ""
 
 
 class Label(NamedTuple):
-    """A text at a point."""
+    """A text around a point, or above the end of a line."""
 
     x: float
     y: float
     text: str
     role: Role
+    above_end: bool = False
 
 
 class Level(NamedTuple):
     """A dashed horizontal line with its text."""
 
-    value: float
+    y: float
     text: str
 
 
@@ -140,7 +140,7 @@ def _of_closed(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPictur
     balls = c.data_of(ClosedSensor).balls
     names = tuple(ball[0] for ball in balls)
     plan = _plan(names, tuple((x, y, contact) for _, x, y, contact, _ in balls))
-    expected = _uncertainty(c, "ball", BALL_MM)
+    expected = _uncertainty(c, "ball")
     if run is None:
         return expected, plan
     presses = run.results[CLOSED_BALLS].result.presses
@@ -151,9 +151,9 @@ def _of_closed(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPictur
 def _of_open(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
     data = c.data_of(OpenSensor)
     joint: RefinementStageResult | None = None if run is None else run.results.get(JOINT)
-    stated = () if data.length_errors is None else (_uncertainty(c, "cylinder", CYLINDER_MM),)
+    stated = () if data.length_errors is None else (_uncertainty(c, "cylinder"),)
     leds, factor = _leds(data)
-    about = f"Ellipses: two standard deviations of the LEDs, drawn {factor:.0f} times as large."
+    about = f"Ellipses: LEDs, two standard deviations, {factor:.0f} times as large."
     if run is None or joint is None or joint.checked is None:
         return (*stated, _plan((), (), leds, about))
     balls, checked = joint.refined.balls, joint.checked
@@ -190,15 +190,14 @@ def _bars(c: Calibration, key: str, names: Sequence[str], errors: Float64Array) 
     )
 
 
-def _uncertainty(c: Calibration, shape: str, size_mm: float) -> ResultPicture:
-    """Return what the uncertainty of a measured object will be, by its depth."""
-    sds = [expected_sd(c, shape, size_mm, float(depth_mm)) for depth_mm in DEPTHS_MM]
-    height, across = (
-        100.0 * COVERAGE * np.array([sd[name] for sd in sds])
-        for name in ("height_mm", "diameter_mm")
-    )
-    height /= DEPTHS_MM
-    across /= size_mm
+def _uncertainty(c: Calibration, shape: str) -> ResultPicture:
+    """Return what the uncertainty of measured objects will be, by their depth: the largest."""
+    shares = []
+    for size_mm, depth_mm in product(SIZES_MM, DEPTHS_MM.tolist()):
+        sd = expected_sd(c, shape, size_mm, depth_mm)
+        shares.append((sd["height_mm"] / depth_mm, sd["diameter_mm"] / size_mm))
+    largest = np.reshape(shares, (len(SIZES_MM), -1, 2)).max(axis=0)
+    height, across = 100.0 * COVERAGE * largest.T
     tolerance = PAPER_PERCENT["depth"]
     decides = DEPTHS_MM[height < tolerance]
     caption = f"No height can be judged by a tolerance of {tolerance:g} %."
@@ -207,14 +206,19 @@ def _uncertainty(c: Calibration, shape: str, size_mm: float) -> ResultPicture:
             f"Heights can be judged by a tolerance of {tolerance:g} % from {decides[0]:.2g} to "
             f"{decides[-1]:.2g} mm deep; diameters are known within {across.max():.2g} %."
         )
-    marks = (
-        Line(DEPTHS_MM, across, "green", "diameter"),
-        Line(DEPTHS_MM, height, "accent", "height"),
-        Level(tolerance, f"tolerance {tolerance:g} %"),
-    )
-    title = f"Expected uncertainty of a {shape} of {size_mm:g} mm, by its depth"
-    labels = "depth (mm)", "U, k = 2 (%)"
-    return ResultPicture("uncertainty", title, caption, labels, marks)
+    marks: list[Mark] = [Level(tolerance, f"tolerance {tolerance:g} %")]
+    free, line = 0.0, TEXT_SHARE * max(height.max(), across.max(), tolerance)
+    roles: dict[str, Role] = {"height": "accent", "diameter": "green"}
+    curves = {"height": height, "diameter": across}
+    for name, values in sorted(curves.items(), key=lambda curve: float(curve[1][-1])):
+        end = max(float(values[-1]), free)
+        marks += (
+            Line(DEPTHS_MM, values, roles[name]),
+            Label(DEPTHS_MM[-1], end, name, roles[name], True),
+        )
+        free = end + line
+    title = "Expected uncertainty of {}s of {:g} to {:g} mm, k = 2 (%)".format(shape, *SIZES_MM)
+    return ResultPicture("uncertainty", title, caption, ("depth (mm)", "%"), tuple(marks))
 
 
 def _plan(
@@ -225,12 +229,20 @@ def _plan(
 ) -> ResultPicture:
     """Return the contacts from above, with what else is known of the sensor."""
     marks: list[Mark] = list(more)
+    placed = [(mark.x, mark.y) for mark in marks if isinstance(mark, Label)]
+    middles = [(x, y) for x, y, _ in rings]
+    apart_mm = TEXT_SHARE * max((abs(y) for _, y in (*placed, *middles)), default=0.0)
     for name, (x, y, radius) in zip(names, rings, strict=True):
-        marks.append(_ring(x, y, radius * np.eye(2), "accent"))
+        ring = _ring(x, y, radius * np.eye(2), "accent")
+        marks.append(ring)
         if len(rings) <= MOST_NAMES:
-            marks.append(Label(x, y, PurePath(name).stem.removeprefix("ball_"), "accent"))
-    caption = f"Circles: contacts of the balls. {about}".rstrip()
-    return ResultPicture("plan", "Where the sensor was measured", caption, ("", ""), tuple(marks))
+            # In the middle, or on the rim where another name is there.
+            places = [(x, y), *zip(ring.x[::6].tolist(), ring.y[::6].tolist(), strict=True)]
+            gaps = [min([apart_mm, *(math.dist(at, p) for p in placed)]) for at in places]
+            placed.append(places[int(np.argmax(gaps))])
+            marks.append(Label(*placed[-1], PurePath(name).stem.removeprefix("ball_"), "accent"))
+    title, caption = "Where the sensor was measured (mm)", f"Circles: ball presses. {about}"
+    return ResultPicture("plan", title, caption.rstrip(), ("", ""), tuple(marks))
 
 
 def _ring(x: float, y: float, axes: Float64Array, role: Role) -> Line:
@@ -253,7 +265,7 @@ def _leds(data: OpenSensor) -> tuple[tuple[Mark, ...], float]:
     ):
         marks.append(_ring(x, y, np.diag(factor * sd), role))
         text = f"\N{PLUS-MINUS SIGN}{1e3 * sd.max():.0f} \N{MICRO SIGN}m"
-        marks.append(Label(INWARDS * x, INWARDS * y, text, role))
+        marks.append(Label(x, y + math.copysign(2.5 * ELLIPSE_MM, y), text, role))
     return tuple(marks), factor
 
 
@@ -277,19 +289,10 @@ def _left(data: OpenSensor, left: Float32Array, step: int) -> ResultPicture:
     grid, percent = data.table.grid, 100.0 * left
     seen = percent[np.isfinite(percent)]
     reach = max(float(np.percentile(np.abs(seen), 99.0)), 0.1) if seen.size else 1.0
-    rows, columns = (np.flatnonzero(np.isfinite(percent).any(axis=k)) for k in (1, 0))
-    if not seen.size:
-        rows, columns = np.arange(len(percent)), np.arange(percent.shape[1])
-    part = percent[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     node_mm, half = step * grid.pitch_mm, 0.5 * grid.pitch_mm
     x, y = float(grid.x_mm[0]) - half, float(grid.y_mm[0]) - half
-    edges = (
-        x + node_mm * columns[0],
-        x + node_mm * (columns[-1] + 1),
-        y + node_mm * rows[0],
-        y + node_mm * (rows[-1] + 1),
-    )
+    edges = x, x + node_mm * percent.shape[1], y, y + node_mm * percent.shape[0]
     rms = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
     caption = f"Of the untouched membrane's light, where balls were pressed; {rms:.2g} % (rms)."
     title = "Light that the model does not explain (%)"
-    return ResultPicture("left", title, caption, ("", ""), (Field(part, edges, reach),))
+    return ResultPicture("left", title, caption, ("", ""), (Field(percent, edges, reach),))

@@ -1,12 +1,18 @@
 """Poor figures have one cause, with the step or the number that corrects it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import scene
 
-from app.calibrate.result_step import corrective_action
+from app.calibrate.result_step import changes_since, corrective_action, terms_markup
 from gelpolight_core.base.finding import QualityTable, judge
 from gelpolight_core.base.root_causes import MODEL
+from gelpolight_core.calibration.closed_sensor.press_sizes import PressSize
+from gelpolight_core.calibration.closed_sensor_recipe import BALLS as CLOSED_BALLS
+from gelpolight_core.calibration.joint_stage import term_facts
 from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.stages.balls.press_agreement import PressAgreement, agreement_figures
@@ -40,3 +46,32 @@ def test_a_ball_that_contradicts_the_others_is_named_with_the_diameter_that_fits
     mend = corrective_action({"reflectance": table}, NONE.having(REFLECTANCE, made))
     assert (mend.step, mend.ball, mend.diameter_mm) == ("balls", "ball_012.png", 3.8)
     assert "8 mm" in mend.text and "3.8 mm" in mend.text
+
+
+def test_on_a_closed_sensor_the_ball_that_contradicts_the_others_gets_its_diameter_too():
+    odd = PressSize("ball_05.png", 9.5, 12.5, 12.7, 0.02)
+    refused = PressSize("ball_09.png", 2.0, 12.5, 12.7, 0.02)
+    made = SimpleNamespace(sizes=(odd, refused), result=SimpleNamespace(refused={refused.name: 1}))
+    quality = {"balls": QualityTable((odd.figure,))}
+    mend = corrective_action(quality, NONE.having(CLOSED_BALLS, made))
+    assert (mend.step, mend.ball, mend.diameter_mm) == ("balls", "ball_05.png", 12.7)
+
+
+@pytest.mark.function("Compare a calibration with the sensor's last one")
+def test_leds_and_light_are_compared_with_those_of_the_last_calibration():
+    now = scene.full_calibration()
+    full = now.data.full
+    moved = replace(full, led_positions_mm=full.led_positions_mm + np.array([0.0, 0.003, 0.004]))
+    last = now.changed(full=replace(moved, background=full.background / 0.996))
+    assert list(changes_since(last, now)) == ["LEDs within 5 \N{MICRO SIGN}m", "light -0.4 %"]
+
+
+@pytest.mark.function("See what each term of the light is worth")
+def test_terms_that_are_needed_come_before_those_that_are_left_out():
+    worth = {"lobe": 0.0004, "gloss": 0.0231, "curves": 0.011}
+    full = replace(scene.full_calibration().data.full, worth=worth)
+    full = replace(full, membrane_sd={**full.membrane_sd, "curve_0.2_red": 0.01})
+    markup = terms_markup(term_facts(full))
+    needed, left_out = markup.split("Left out")
+    assert "2.3 %" in needed and "0.21" in needed and "1.1 %" in needed
+    assert "&lt; 0.1 %" in left_out

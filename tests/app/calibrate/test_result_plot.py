@@ -30,7 +30,7 @@ def test_a_click_on_a_bar_opens_its_press(qtbot):
 
 def test_charts_begin_at_zero_and_show_their_limits(qtbot):
     depths = np.linspace(0.1, 1.5, 5)
-    marks = Line(depths, depths + 1.0, "accent", "height"), Level(8.0, "tolerance 8 %")
+    marks = Line(depths, depths + 1.0, "accent"), Level(8.0, "tolerance 8 %")
     plot = ResultPlot(ResultPicture("uncertainty", "U", "", ("depth (mm)", "%"), marks))
     qtbot.addWidget(plot)
     _, (low, high) = plot.plot.viewRange()

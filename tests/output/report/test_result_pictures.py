@@ -30,6 +30,29 @@ def marks_of(picture, kind):
     return [mark for mark in picture.marks if isinstance(mark, kind)]
 
 
+def test_no_text_of_the_plan_lies_on_another_one(small_run):
+    """Two balls at one place are named beside each other, and LEDs outside."""
+    joint = small_run.results[JOINT]
+    balls = (joint.refined.balls[0], *joint.refined.balls[:-1])
+    joint = replace(joint, refined=replace(joint.refined, balls=balls))
+    plan = pictures_of(replace(small_run, results=small_run.results.having(JOINT, joint)))["plan"]
+    labels = marks_of(plan, Label)
+    height_mm = max(abs(label.y) for label in labels)
+    for k, one in enumerate(labels):
+        for other in labels[:k]:
+            assert math.hypot(one.x - other.x, one.y - other.y) > 0.1 * height_mm
+
+
+def test_curves_of_the_uncertainty_are_named_at_their_ends(small_run):
+    picture = pictures_of(small_run)["uncertainty"]
+    ends = sorted(line.y[-1] for line in marks_of(picture, Line))
+    labels = sorted(marks_of(picture, Label), key=lambda label: label.y)
+    assert {label.text for label in labels} == {"height", "diameter"}
+    assert labels[0].y == pytest.approx(ends[0])
+    top = max(max(line.y) for line in marks_of(picture, Line))
+    assert labels[1].y >= max(ends[1], labels[0].y + 0.1 * top)
+
+
 @pytest.mark.function("See the height error of each ball, the worst first")
 def test_the_worst_ball_comes_first_and_is_marked_beyond_the_limit(small_run):
     joint = small_run.results[JOINT]
@@ -38,12 +61,10 @@ def test_the_worst_ball_comes_first_and_is_marked_beyond_the_limit(small_run):
     joint = replace(joint, checked=replace(joint.checked, height_errors=errors))
     picture = pictures_of(replace(small_run, results=small_run.results.having(JOINT, joint)))
     (bars,), (limit,) = (marks_of(picture["balls"], kind) for kind in (Bars, Level))
-    assert bars.values[0] == pytest.approx(30.0)
-    assert list(bars.values) == sorted(bars.values, reverse=True)
-    assert len(bars.values) == len(errors) - 1
-    assert [role for role, e in zip(bars.roles, bars.values, strict=True) if e > limit.value] == [
-        "warn"
-    ]
+    assert bars.y[0] == pytest.approx(30.0)
+    assert list(bars.y) == sorted(bars.y, reverse=True)
+    assert len(bars.y) == len(errors) - 1
+    assert [role for role, e in zip(bars.roles, bars.y, strict=True) if e > limit.y] == ["warn"]
     assert bars.names[0] in picture["balls"].caption
 
 
