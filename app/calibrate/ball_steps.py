@@ -235,7 +235,8 @@ class BallsStep(ImageStep):
         if table is None:
             return (), ()
         earlier_mm = [] if balls is None else [press.pose.centre_mm for press in balls.presses]
-        next_mm = next_press_mm(table, self.radius_mm, earlier_mm)
+        finished = self.model.page.finished
+        next_mm = None if finished else next_press_mm(table, self.radius_mm, earlier_mm)
         return _pixels(earlier_mm, table), () if next_mm is None else _pixels([next_mm], table)
 
     def of_capture(self, name: str, detect: Detector, marks: ImageOverlay) -> Detector:
@@ -246,8 +247,8 @@ class BallsStep(ImageStep):
         return partial(ball_in_capture, detect=detect)
 
     def depends_on(self) -> tuple[Any, ...]:
-        """Return the radius of the shown or of the next press."""
-        return (self.radius_mm,)
+        """Return the radius of the shown or of the next press, and whether one is wanted."""
+        return self.radius_mm, self.model.page.finished
 
     def judge(self, path: Path) -> Finding | None:
         """Return how a press was judged."""

@@ -52,4 +52,6 @@ def test_the_bench_presses_the_ball_where_the_ring_is(technician, bench, compute
     ring_mm = next_press_mm(table_of(project.results), step.radius_mm, earlier_mm)
     # A pixel of the small camera is 0.1 mm.
     assert (scene.x_mm, scene.y_mm) == pytest.approx(ring_mm, abs=0.2)
+    technician.wizard.model.update_page(finished=True)
+    assert not step.places_px()[1], "a complete step asks for no press"
     technician.rest()
