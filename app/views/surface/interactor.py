@@ -31,7 +31,7 @@ KEY_DEG = 6.0
 KEY_ZOOM = 1.15
 TO_VIEWER = 0.0, -1.0, 0.0
 """Normal of the clip plane at first."""
-ORIENTATION_PX = 120  # but at most a third of the view
+ORIENTATION_PX = 120  # but at most half of the view
 SHADOW_MM = 1.5
 """Hollows of about this size are shaded in a frozen image: the size of a deep press."""
 
@@ -173,7 +173,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         if self._finished:
             return
         super().resizeGL(width, height)
-        side = round(self.devicePixelRatioF() * min(ORIENTATION_PX, self.height() / 3))
+        side = round(self.devicePixelRatioF() * min(ORIENTATION_PX, self.height() / 2))
         self._orientation.GetRepresentation().SetSize(side, side)
         self._orientation.SquareResize()
         if self._fitted:

@@ -197,11 +197,11 @@ def test_the_clip_plane_hides_one_side_and_can_be_removed(panel, qtbot):
 def test_the_orientation_widget_has_one_size_on_every_screen(panel, qtbot):
     view = panel.view
     assert view is not None
-    for height in (600, 250):
+    for height in (600, 200):
         before = view.height()
         panel.resize(500, height)
         qtbot.waitUntil(lambda before=before: view.height() != before, timeout=10_000)
-        side = round(view.devicePixelRatioF() * min(120, view.height() / 3))
+        side = round(view.devicePixelRatioF() * min(120, view.height() / 2))
         assert tuple(view._orientation.GetRepresentation().GetSize()) == (side, side)
 
 
