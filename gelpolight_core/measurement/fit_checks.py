@@ -64,9 +64,9 @@ def _blurred(fit: IndenterFit) -> Finding | None:
     if fit.more_blur_mm == 0.0:
         return None
     text = (
-        f"the walls are blurred by {1e3 * fit.more_blur_mm:.0f} um more than by the camera at "
-        "calibration: the lens is out of focus, the camera processes its images, or the object "
-        "moved"
+        f"the walls are blurred by {1e3 * fit.more_blur_mm:.0f} \N{MICRO SIGN}m more than by the "
+        "camera at calibration: the lens is out of focus, the camera processes its images, or the "
+        "object moved"
     )
     return doubtful_finding("blurred_walls", text)
 
@@ -84,14 +84,14 @@ def _wrong_shape(fit: IndenterFit) -> Finding | None:
     if best and fit.rivals_mm[best] < BETTER_SHAPE * fit.residual_rms_mm:
         rival_um = 1e3 * fit.rivals_mm[best]
         text = (
-            f"a {best} fits better (residual {rival_um:.0f} um) "
-            f"than a {shape} ({residual_um:.0f} um)"
+            f"a {best} fits better (residual {rival_um:.0f} \N{MICRO SIGN}m) "
+            f"than a {shape} ({residual_um:.0f} \N{MICRO SIGN}m)"
         )
         return doubtful_finding("shape", text)
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share > POOR_RESIDUAL:
         text = (
-            f"the map departs from a {shape} by {residual_um:.0f} um, "
+            f"the map departs from a {shape} by {residual_um:.0f} \N{MICRO SIGN}m, "
             f"{100.0 * share:.0f} % of its height"
         )
         return doubtful_finding("residual", text)

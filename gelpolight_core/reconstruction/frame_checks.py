@@ -259,8 +259,8 @@ def too_coarse_notes(
     if lost_mm <= max(MOST_LOST * depth_mm, SIGMAS * noise_mm):
         return ()
     text = (
-        "the deepest point is finer than nodes of {p:.2f} mm resolve: its depth may be {um:.0f} um "
-        "too small; use a finer effort or larger images"
+        "the deepest point is finer than nodes of {p:.2f} mm resolve: its depth may be {um:.0f} "
+        "\N{MICRO SIGN}m too small; use a finer effort or larger images"
     )
     return (_note("too_coarse", text.format(p=node_mm, um=1e3 * lost_mm)),)
 
@@ -270,8 +270,8 @@ def visible_depth_notes(visible_mm: float) -> tuple[Finding, ...]:
     if visible_mm <= MOST_HIDDEN_MM:
         return ()
     text = (
-        "no contact was found, but this calibration's noise hides faces of less than {um:.0f} um: "
-        "calibrate again with more light or less gain"
+        "no contact was found, but this calibration's noise hides faces of less than {um:.0f} "
+        "\N{MICRO SIGN}m: calibrate again with more light or less gain"
     )
     return (_note("hidden_depth", text.format(um=1e3 * visible_mm)),)
 

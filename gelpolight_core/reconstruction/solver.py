@@ -257,7 +257,7 @@ class OpenSolver(ABC):
 
 def not_visible_reason(visible_mm: float) -> str:
     """Return why an image without a contact is not solved."""
-    text = "the image equals the background; smallest visible depth {um:.0f} um"
+    text = "the image equals the background; smallest visible depth {um:.0f} \N{MICRO SIGN}m"
     return text.format(um=1e3 * visible_mm)
 
 
