@@ -355,22 +355,17 @@ class _MapImages:
 
     def surface(self) -> DisplaySurface | None:
         """Return the mesh nodes, their colours and the colour scale."""
-        request, display = self._wanted, self._display
-        if display.colour_by == "depth" and not request.still:
-            scale, texture = self._depth_scale(), self._shaded
-        else:
+        still, texture, scale = self._wanted.still, self._shaded, self._depth_scale()
+        if self._display.colour_by != "depth":
             rgb, scale = self._quantity()
-            texture = rgb
-            if not request.still:
-                texture = np.asarray(cv2.multiply(rgb, self._light(), scale=1 / 255.0), np.uint8)
+            texture = np.asarray(cv2.multiply(rgb, self._light(), scale=1 / 255.0), np.uint8)
         return surface_of(
             self._map,
             texture,
             scale,
             range_mm=self.range_mm,
-            largest=None if request.still else LIVE_NODES,
-            depth_mm=None if request.still else self._depth,
-            light=display.light if request.still else None,
+            largest=None if still else LIVE_NODES,
+            depth_mm=None if still else self._depth,
         )
 
     def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:

@@ -155,16 +155,13 @@ class DisplaySurface:
     extent_mm : (left, top, right, bottom)
         Area that the texture covers.
     texture : (rows, columns, 3) uint8
-        Colours.
+        Colours, shaded.
     scale : ColourScale
         Meaning of the colours.
     range_mm : (low, high)
         Depths at the ends of the depth axis. Steady from frame to frame.
     curved : bool
         Whether it is the surface of a curved membrane itself, not its indentation.
-    light : (x, y, z) or None
-        Unit vector to the lamp, x right, y down, z out of the surface. None: the texture is
-        already shaded.
     """
 
     x_mm: NDArray[np.float32]
@@ -175,7 +172,6 @@ class DisplaySurface:
     scale: ColourScale
     range_mm: tuple[float, float]
     curved: bool
-    light: tuple[float, float, float] | None = None
 
     @property
     def axis(self) -> str:
@@ -239,7 +235,6 @@ def surface_of(
     range_mm: tuple[float, float],
     largest: int | None = None,
     depth_mm: NDArray[np.float32] | None = None,
-    light: tuple[float, float, float] | None = None,
 ) -> DisplaySurface | None:
     """Return the surface of a height map, or None if its working area is empty.
 
@@ -257,8 +252,6 @@ def surface_of(
         Maximum number of nodes per side. Default: all.
     depth_mm : (rows, columns), optional
         The depth averaged to fewer pixels, which is faster to sample.
-    light : (x, y, z), optional
-        Unit vector to the lamp if the texture is not shaded.
     """
     depth = heightmap.depth_mm if depth_mm is None else depth_mm
     inside = heightmap.flags & Flag.OUTSIDE.value == 0
@@ -306,5 +299,4 @@ def surface_of(
         scale=scale,
         range_mm=range_mm,
         curved=not heightmap.at_rest.flat,
-        light=light,
     )

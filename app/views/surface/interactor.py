@@ -32,8 +32,6 @@ KEY_ZOOM = 1.15
 TO_VIEWER = 0.0, -1.0, 0.0
 """Normal of the clip plane at first."""
 ORIENTATION_PX = 120  # but at most half of the view
-SHADOW_MM = 1.5
-"""Hollows of about this size are shaded in a frozen image: the size of a deep press."""
 
 
 class Interactor(QtInteractor):  # type: ignore[misc]
@@ -94,7 +92,7 @@ class Interactor(QtInteractor):  # type: ignore[misc]
     # Called by the panel
 
     def show_surface(self, surface: DisplaySurface, *, still: bool = False) -> None:
-        """Show the surface of a frame. One that stays gets smooth edges and soft shadows."""
+        """Show the surface of a frame. One that stays gets smooth edges."""
         self._settle.stop()
         self._polish(False)
         self.scene.show_surface(surface)
@@ -214,14 +212,10 @@ class Interactor(QtInteractor):  # type: ignore[misc]
         self.update()
 
     def _polish(self, on: bool) -> None:
-        """Draw smooth edges and shadows in hollows, which takes too long for live images."""
-        if on and not self._polished:
-            self.enable_anti_aliasing("fxaa")
-            self.enable_ssao(radius=SHADOW_MM, bias=0.05, kernel_size=64)
-        elif self._polished and not on:
-            self.disable_ssao()
-            self.disable_anti_aliasing()
-        self._polished = on
+        """Draw smooth edges, which takes too long for live images."""
+        if on != self._polished:
+            self._polished = on
+            self.enable_anti_aliasing("fxaa") if on else self.disable_anti_aliasing()
 
     def _on_plane(self, normal: object, origin: object) -> None:
         self.scene.clip_by((np.asarray(normal, float), np.asarray(origin, float)))

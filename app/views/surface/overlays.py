@@ -53,7 +53,7 @@ QUIET: dict[str, Any] = {"reset_camera": False, "render": False}
 """Added to the scene without moving the camera or drawing at once."""
 PLAIN = {**QUIET, "lighting": False}
 LIFT = 0.001
-"""Lines lie above the surface by this share of its width, so that shadows do not cover them."""
+"""Lines lie above the surface by this share of its width, so that it does not cover them."""
 
 
 def points_on(surface: DisplaySurface, points_mm: Float64Array) -> Float64Array:
@@ -311,5 +311,4 @@ def _write(plotter: Plotter, name: str, text: str, place: str, ink: SceneColours
 
 def _label(plotter: Plotter, name: str, at: Any, texts: list[str], size: int, **how: Any) -> None:
     options = {"shape": None, "show_points": False, "font_size": size, "font_file": FONT}
-    # Without a test of what hides them, which fails where hollows have shadows.
     plotter.add_point_labels(at, texts, name=name, always_visible=True, **options, **how, **QUIET)

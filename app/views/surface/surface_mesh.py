@@ -9,9 +9,6 @@ from pyvista.plotting import BasePlotter
 
 from .display_surface import DisplaySurface
 
-# Lighting of a lit mesh.
-_LIT = {"ambient": 0.35, "diffuse": 0.75, "specular": 0.12, "specular_power": 20.0}
-
 
 class SurfaceMesh:
     """Triangle strips between the rows of a surface."""
@@ -21,17 +18,11 @@ class SurfaceMesh:
         self._x = np.zeros((0, 0), np.float32)
 
     def show(self, surface: DisplaySurface) -> None:
-        """Copy a surface's depth, with normals if it is lit."""
+        """Copy a surface's depth."""
         if not np.array_equal(surface.x_mm, self._x):
             self._x = surface.x_mm
             self.mesh.copy_from(_strips(surface))
         self.mesh.points[:, 2] = surface.depth_mm.ravel()
-        if surface.light is not None:
-            grid = np.asarray(self.mesh.points).reshape(*surface.depth_mm.shape, 3)
-            # Rows run down: in this order the cross product points to the viewer.
-            normals = np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1))
-            normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-            self.mesh.point_data.active_normals = normals.reshape(-1, 3)
         self.mesh.GetPoints().Modified()
 
 
@@ -49,16 +40,13 @@ def _strips(surface: DisplaySurface) -> pv.PolyData:
 
 
 class SurfaceActor:
-    """The surface on a plotter, with its texture and lamp. Coarse during camera moves."""
+    """The surface on a plotter, with its shaded texture. Coarse during camera moves."""
 
     def __init__(self, plotter: BasePlotter) -> None:
         self._fine, self._coarse = SurfaceMesh(), SurfaceMesh()
         self._texture = pv.Texture(np.zeros((1, 1, 3), np.uint8))
         self._image = pv.ImageData(dimensions=(1, 1, 1))
-        self._lamp = pv.Light(light_type="scene light")
-        plotter.remove_all_lights()
-        plotter.add_light(self._lamp)
-        how = {"show_scalar_bar": False, "reset_camera": False, "render": False}
+        how = {"show_scalar_bar": False, "reset_camera": False, "render": False, "lighting": False}
         self.actor = plotter.add_mesh(
             pv.Plane(), texture=self._texture, color="white", name="surface", **how
         )
@@ -71,14 +59,6 @@ class SurfaceActor:
         """Show a surface with all its nodes."""
         self._fine.show(surface)
         self._show_texture(surface.texture)
-        how = self.actor.prop
-        how.lighting = surface.light is not None
-        if surface.light is not None:
-            x, y, z = surface.light
-            self._lamp.position = (100.0 * x, -100.0 * y, 100.0 * z)
-            how.interpolation = "gouraud"
-            for name, value in _LIT.items():
-                setattr(how, name, value)
         self.refine()
         self.actor.visibility = True
 

@@ -103,7 +103,12 @@ def test_the_surface_shows_each_quantity_with_its_own_scale(dome, frame, quantit
     }  # fmt: skip
     assert (scale.low, scale.high) == pytest.approx(expected[quantity])
     assert bool(scale.names) == (quantity == "flags")
-    assert (shown.surface.light is not None) == still
+    live, _ = _made(
+        replace(dome, depth_sd_mm=sd), frame, surface=True,
+        display=DisplaySettings(colour_by=quantity), reference=ReferenceMap(before),
+    )  # fmt: skip
+    if not still or quantity != "uncertainty":  # live, the depth is shown instead
+        np.testing.assert_array_equal(shown.surface.texture, live.surface.texture)
     largest = max(shown.surface.depth_mm.shape)
     assert largest == max(dome.depth_mm.shape) if still else largest <= LIVE_NODES
 
