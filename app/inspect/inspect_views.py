@@ -261,7 +261,7 @@ class InspectViews(QWidget):
             self.processing.show_still(still)
             if not self._has_depth:
                 self._has_depth = True
-                self.marks.spread(extent_of(result.heightmap))
+                self.marks.spread(result.heightmap)
                 self._on_marks()
             self.display.show_range(*result.range_mm)
         self.stage.show_frame(result, still=still)

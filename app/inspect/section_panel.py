@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import zip_longest
 
 import numpy as np
 import pyqtgraph as pg
@@ -13,9 +14,8 @@ from PySide6.QtWidgets import QWidget
 
 from app.live.tool_layer import DrawnTool, corners_of, rectangle_grips, rectangle_moved
 from app.views.map.handles import Handle
-from app.views.map.map_view import Extent
 from app.views.map.profile_plot import LINE_INK, ProfilePlot
-from app.views.map.sections import STEP_BETWEEN, SectionResult, SectionSettings
+from app.views.map.sections import SectionResult, SectionSettings
 from app.widgets.actions import Slot, push_button
 from app.widgets.forms import Form
 from app.widgets.label import MarkupLabel, escaped
@@ -23,6 +23,7 @@ from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.arrays import PointXY
 from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 REGION_INK, POINT_INK = "#ff5c2e", "#5ad7ff"
 LEAST_MM = 0.05
@@ -55,22 +56,26 @@ class SectionMarks:
         self.start_mm, self.end_mm = SectionSettings().start_mm, SectionSettings().end_mm
         self.rectangle = Rectangle((0.0, 0.0), (4.0, 4.0))
         self.points_mm: tuple[PointXY, ...] = ()
+        self._placed = False
 
     @property
     def _middle(self) -> PointXY:
         (x0, y0), (x1, y1) = self.start_mm, self.end_mm
         return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
-    def spread(self, extent: Extent) -> None:
-        """Place the points around the middle of the first map."""
-        if self.points_mm:
+    def spread(self, heightmap: HeightMap) -> None:
+        """Place the line across the working area and the points in it, until one is dragged."""
+        x_mm, y_mm = heightmap.x_mm, heightmap.y_mm
+        inside = heightmap.flags[len(y_mm) // 2] & Flag.OUTSIDE.value == 0
+        if self._placed or not inside.any():
             return
-        left, top, right, bottom = extent
-        reach_mm = 0.5 * REACH * min(right - left, bottom - top)
-        angles_rad = np.radians([210.0, 330.0, 90.0])
-        x = 0.5 * (left + right) + reach_mm * np.cos(angles_rad)
-        y = 0.5 * (top + bottom) + reach_mm * np.sin(angles_rad)
-        self.points_mm = tuple(zip(x.tolist(), y.tolist(), strict=True))
+        left, right = (float(end) for end in x_mm[inside][[0, -1]])
+        middle = 0.5 * (left + right), float(y_mm[len(y_mm) // 2])
+        self.start_mm, self.end_mm = (left, middle[1]), (right, middle[1])
+        reach_mm = 0.5 * REACH * min(right - left, float(y_mm[-1] - y_mm[0]))
+        angles_rad = np.radians([[210.0, 330.0, 90.0], [120.0, 240.0, 0.0]])
+        points = reach_mm * np.cos(angles_rad).T + middle
+        self.points_mm = tuple((x, y) for x, y in points.tolist())
 
     def drawn(
         self, *, line: bool, rectangle: bool, points: bool, width_mm: float
@@ -112,6 +117,7 @@ class SectionMarks:
 
     def on_drag(self, name: str, to_mm: PointXY, *, ended: bool) -> None:
         """Move an end or the middle of the line, the rectangle or a point."""
+        self._placed = True
         if name.isdigit():
             index = int(name) - 1
             self.points_mm = (*self.points_mm[:index], to_mm, *self.points_mm[index + 1 :])
@@ -174,12 +180,12 @@ class SectionPanel(QWidget):
     def _make_plot(self) -> None:
         self._plot = ProfilePlot("inspect.section.plot")
         self._plot.setToolTip(
-            "The step goes from the tinted part at the start to that in the middle. Drag the "
-            "dashed line to set the depth of the width"
+            "The step goes from the tinted part at the start to that in the middle of the object. "
+            "Drag the dashed line to set the depth of the width"
         )
         self._plot.allow_level()
         self._parts = [
-            pg.LinearRegionItem(brush=PART, pen=pg.mkPen(None), movable=False) for _ in STEP_BETWEEN
+            pg.LinearRegionItem(brush=PART, pen=pg.mkPen(None), movable=False) for _ in range(2)
         ]
         for part in self._parts:
             self._plot.addItem(part, ignoreBounds=True)
@@ -188,10 +194,10 @@ class SectionPanel(QWidget):
         """Show the measurements of a frame."""
         self.cut = cut
         self._plot.show_profile(cut.profile)
-        for part, ends in zip(self._parts, STEP_BETWEEN, strict=True):
-            part.setVisible(cut.profile is not None)
-            if cut.profile is not None:
-                part.setRegion([fraction * float(cut.profile.along_mm[-1]) for fraction in ends])
+        for part, ends in zip_longest(self._parts, cut.step_parts):
+            part.setVisible(ends is not None)
+            if ends is not None:
+                part.setRegion(ends)
         self._plot.show_width(cut.width_ends)
         self._figures.setText(
             "<br>".join(

@@ -32,10 +32,10 @@ ABOUT_CUTOFF = (
 )
 
 
-STEP_BETWEEN = (0.02, 0.14), (0.44, 0.56)
-"""Parts of the line between which the step is measured, as shares of its length: the surface at its
-start, and what lies in its middle. Each is long enough to average the noise, and short enough for a
-small face."""
+FLOOR, PLATEAU = (0.02, 0.14), (0.375, 0.625)
+"""Parts between which the step is measured: the surface at the start, as shares of the line, and
+the object's face, as shares of its width at half height. Each is long enough to average the noise,
+and short enough for a small face."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +82,15 @@ class SectionResult:
         Why something could not be measured.
     width_ends : (left, right, level) or None
         Ends of the width: two positions along the line, and their depth; mm.
+    step_parts : tuple of (start, end)
+        The two parts of the line between which the step is measured, mm. Empty if it is not.
     """
 
     profile: Profile | None = None
     figures: tuple[MeasuredValue, ...] = ()
     sentences: tuple[str, ...] = ()
     width_ends: tuple[float, float, float] | None = None
+    step_parts: tuple[PointXY, ...] = ()
 
 
 def measure_sections(
@@ -98,12 +101,19 @@ def measure_sections(
     ends: tuple[float, float, float] | None = None
     figures: list[MeasuredValue] = []
     sentences: list[str] = []
+    parts: list[PointXY] = []
 
     def measured(measure: Callable[[], Sequence[MeasuredValue]]) -> None:
         try:
             figures.extend(measure())
         except InputError as error:
             sentences.append(error.found)
+
+    def step(taken: Profile) -> list[MeasuredValue]:
+        start, end, _ = width_ends(taken)
+        parts.append((FLOOR[0] * taken.along_mm[-1], FLOOR[1] * taken.along_mm[-1]))
+        parts.append((start + PLATEAU[0] * (end - start), start + PLATEAU[1] * (end - start)))
+        return [step_height(taken, *parts)]
 
     try:
         profile = taken = take_profile(
@@ -112,9 +122,8 @@ def measure_sections(
     except InputError as error:
         sentences.append(str(error))
     else:
-        level_mm, length = section.level_mm or None, float(taken.along_mm[-1])
-        first, second = ((low * length, high * length) for low, high in STEP_BETWEEN)
-        measured(lambda: [step_height(taken, first_mm=first, second_mm=second)])
+        level_mm = section.level_mm or None
+        measured(lambda: step(taken))
         measured(lambda: [width_at(taken, level_mm)])
         if section.cutoff_mm:
             measured(lambda: profile_roughness(taken, cutoff_mm=section.cutoff_mm))
@@ -122,4 +131,5 @@ def measure_sections(
             ends = width_ends(taken, level_mm)
     if region is not None:
         measured(lambda: roughness(heightmap, region))
-    return SectionResult(profile, tuple(figures), tuple(dict.fromkeys(sentences)), ends)
+    said = tuple(dict.fromkeys(sentences))
+    return SectionResult(profile, tuple(figures), said, ends, tuple(parts))
