@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 
 from app.program.context import AppContext
 from app.sources.latest import Latest
+from app.sources.player import Player
 from app.sources.recording import RecordingSource
 from app.sources.source import Source, SourceFrame
 from app.sources.stoppable_thread import PROCESSING
@@ -81,6 +82,7 @@ class LiveSession(QObject):
         super().__init__(parent)
         self._context, self._keeps_seen = context, keeps_seen
         self.stream: Stream | None = None
+        self._kept: dict[str, Any] = {}
         self.page_shown, self._wanted = False, True
         self.paused = self._resting = False
         self._lost = ""
@@ -111,7 +113,10 @@ class LiveSession(QObject):
         self._close()
         info = self._context.source.info
         if info is not None and self.page_shown and self._wanted:
-            self.stream = Stream(info.open(), keeps_seen=self._keeps_seen)
+            source, self._kept = info.open(), self._context.source.kept
+            if isinstance(source, Player) and "playback" in self._kept:
+                source.resume(self._kept["playback"])
+            self.stream = Stream(source, keeps_seen=self._keeps_seen)
             if not self.paused:
                 self.stream.add_tap(self._latest.submit)
             self.stream.start()
@@ -135,6 +140,8 @@ class LiveSession(QObject):
         self._status.stop()
         capture, self._capture = self._capture, None
         if self.stream is not None:
+            if isinstance(source := self.stream.source, Player):
+                self._kept["playback"] = source.playback()
             self.stream.remove_tap(self._latest.submit)
             self._latest.stop()
             self._resting = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -30,6 +30,8 @@ class SourceSelection(QObject):
         The source.
     bench : VirtualBench or None
         The objects on the virtual sensor. None until the virtual sensor is first selected.
+    kept : dict of str to object
+        What a page leaves for the next one that opens the source: position and colour range.
     """
 
     changed = Signal()
@@ -38,11 +40,12 @@ class SourceSelection(QObject):
         super().__init__()
         self.info: SourceInfo | None = None
         self.bench: VirtualBench | None = None
+        self.kept: dict[str, Any] = {}
 
     def choose(self, info: SourceInfo | None) -> None:
         """Select a source, or none."""
         if info is not self.info:
-            self.info = info
+            self.info, self.kept = info, {}
             self.changed.emit()
 
     def choose_virtual_sensor(self) -> VirtualBench:

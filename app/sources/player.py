@@ -89,9 +89,10 @@ class Player:
         raise NotImplementedError
 
     def _rewind(self, times_s: NDArray[np.float64]) -> None:
-        """Go to the start of frames with these times."""
+        """Go to the first frame of those with these times, or to where it is resumed."""
         self._times_s = times_s
-        self._pending, self._number, self._shown = 0, -1, None
+        self._pending = min(self._now.position, len(times_s) - 1)
+        self._number, self._shown = -1, None
 
     def frame(self, timeout_s: float) -> SourceFrame | None:
         """Wait for the next frame. None: it is not due yet."""
@@ -105,7 +106,7 @@ class Player:
                 if due_s <= now_s:
                     self._number += 1 if index is None else self._move_to(index, due_s, now_s)
                     self._delivered_s = now_s
-                    position, number = self._position, self._number
+                    position, number, paused = self._position, self._number, not self._now.playing
                     break
                 if now_s >= end_s:
                     return None
@@ -114,8 +115,8 @@ class Player:
             if (rgb := self._read(position)) is None:
                 return None
             self._shown = position, rgb
-        name = self.image_name(position)
-        return SourceFrame(self._shown[1], number, time.monotonic(), index=position, name=name)
+        name, rgb, time_s = self.image_name(position), self._shown[1], time.monotonic()
+        return SourceFrame(rgb, number, time_s, index=position, name=name, paused=paused)
 
     def settings(self) -> tuple[SourceSetting, ...]:
         """Return none."""
@@ -146,6 +147,10 @@ class Player:
                 time_s=float(times_s[position] - times_s[0]),
                 duration_s=float(times_s[-1] - times_s[0]),
             )
+
+    def resume(self, playback: Playback) -> None:
+        """Begin in the state of another player of these frames, once it is opened."""
+        self._now = playback
 
     def play(self) -> None:
         """Continue to play, or play from the start if the end was reached."""

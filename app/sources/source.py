@@ -33,6 +33,8 @@ class SourceFrame:
         live image.
     name : str
         File name of a stored image, after which exports of it are named. Empty for a live image.
+    paused : bool
+        Whether a stored image is shown by itself, and continues no other one.
     """
 
     rgb: PixelArray
@@ -41,6 +43,7 @@ class SourceFrame:
     settled: bool = True
     index: int | None = None
     name: str = ""
+    paused: bool = False
 
     def __post_init__(self) -> None:
         """Reject arrays that are not colour images, and make the memory read-only."""

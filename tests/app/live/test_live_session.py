@@ -2,6 +2,7 @@
 
 import threading
 
+import cv2
 import numpy as np
 import pytest
 
@@ -117,3 +118,28 @@ def test_a_lost_camera_is_reported_until_it_is_opened_again(live, camera, qtbot)
     camera.lost.clear()
     live.open()
     assert reasons[-1] == ""
+
+
+@pytest.mark.function("Go to another page: a folder or recording stays at its image")
+def test_the_next_page_opens_a_folder_at_the_image_of_the_page_before(
+    live, context, qtbot, tmp_path
+):
+    for name in ("a.png", "b.png", "c.png"):
+        cv2.imwrite(str(tmp_path / name), np.zeros((4, 6, 3), np.uint8))
+    context.source.choose_folder(tmp_path)
+    other = LiveSession(context=context, name="other page")
+    names = list[str]()
+    for session in (live, other):
+        session.process(lambda frame: names.append(frame.name))
+    live.enter(True)
+    qtbot.waitUntil(lambda: names[-1:] == ["a.png"], timeout=WAIT_MS)
+    live.source.step(2)
+    qtbot.waitUntil(lambda: names[-1:] == ["c.png"], timeout=WAIT_MS)
+    live.enter(False)
+    names.clear()
+    other.enter(True)
+    qtbot.waitUntil(lambda: bool(names), timeout=WAIT_MS)
+    assert set(names) == {"c.png"}
+    context.source.choose_folder(tmp_path)  # chosen again: from the start
+    qtbot.waitUntil(lambda: names[-1] == "a.png", timeout=WAIT_MS)
+    other.finish()

@@ -58,6 +58,7 @@ def test_a_folder_stays_at_a_file_until_stepped_and_names_it(folder):
         frame = following(source)
         assert frame.name == source.playback().file == name
         assert frame_name(frame) == f"{Path(name).stem}.png"
+        assert frame.paused
         assert np.array_equal(frame.rgb, image("abc".index(name[0])))
     source.close()
     assert next_image(folder / "a.png") == folder / "b.TIFF"
