@@ -207,8 +207,8 @@ class FrameProcessor:
         heightmap = processed.heightmap
         misfit = self._misfit(frame, raw, request)
         misfit_top = 0.0 if misfit is None else self._steady_top(misfit, frame)
-        # A processed map has a range of its own, which the live images do not continue.
-        colours = ColourRange() if processed.steps else self.colour_range
+        # A processed map and a paused one have a range of their own, which nothing continues.
+        colours = ColourRange() if processed.steps or frame.paused else self.colour_range
         automatic = colours.update(heightmap.depth_mm, frame.time_s)
         range_mm = request.display.range_mm or automatic
         images = _MapImages(processed, raw, request, range_mm, misfit, misfit_top)

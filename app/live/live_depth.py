@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 from app.program.context import AppContext
 from app.program.jobs import JobQueue
 from app.sources.latest import Done
-from app.sources.source import SourceFrame, SourceInfo
+from app.sources.source import SourceFrame
 from app.views.map.colour_range import ColourRange
 from gelpolight_core.base.compared_quantity import value_text
 from gelpolight_core.base.finding import Finding
@@ -78,7 +78,6 @@ class LiveDepth(QObject):
         self._maker = FrameProcessor(None)
         self._chosen: tuple[Reconstructor | None, Reconstructor | None] = None, None
         self._size: Size | None = None
-        self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthMonitor()
         self._fault: Finding | None = None
@@ -151,6 +150,12 @@ class LiveDepth(QObject):
         return self._maker.live
 
     @property
+    def _colour_range(self) -> ColourRange:
+        """The automatic range of the source's colours, which all pages continue."""
+        colours: ColourRange = self._context.source.kept.setdefault("colours", ColourRange())
+        return colours
+
+    @property
     def _camera_used(self) -> str:
         """Identity of the camera of the calibration in use. Empty if unknown."""
         live = self._chosen[0]
@@ -217,10 +222,7 @@ class LiveDepth(QObject):
         self.last, self._failure = None, ""
         self._shown_s.clear()
         self._restart_health()
-        info = self._context.source.info
-        if self.live.stream is not None and info != self._info:
-            self._info = info
-            self._maker.colour_range = ColourRange()
+        self._maker.colour_range = self._colour_range
         self.update()
 
     def _on_lost(self, why: str) -> None:
@@ -292,7 +294,7 @@ class LiveDepth(QObject):
         """Use these reconstructors from now on, and drop results in progress."""
         before, request = self._maker.live, self._maker.wanted
         self._maker = FrameProcessor(live, best)
-        self._maker.wanted = request
+        self._maker.wanted, self._maker.colour_range = request, self._colour_range
         self.live.process(self._maker)
         if self.last is not None:
             self.last = FrameResult(

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from app.widgets.units import round_up
 
-HEADROOM = 1.2
-"""Share of an end to a round depth, around which presses scatter: they have the same colours."""
+HEADROOM, LIMIT = 1.2, 1.25
+"""Shares of a round depth, around which presses scatter: its end, and the largest depth with it.
+Between them all depths have the last colour, so that a press to an end itself does not change its
+colours when its rim is resolved in a frozen image."""
 LEAST_MM = 0.02
 """Least depth for the upper end, so that the noise of the bare membrane is not shown as depth."""
 SHRINK_BELOW = 0.4
@@ -22,7 +24,7 @@ class ColourRange:
     """The automatic range of the colours over a sequence of depth maps.
 
     Each end is 0, or 1, 2, 5 times a power of ten times `HEADROOM`. It grows as soon as the depth
-    goes beyond it. It shrinks after the depth was small for `SHRINK_AFTER_S` of a press. Without
+    goes beyond its limit. It shrinks after the depth was small for `SHRINK_AFTER_S` of a press. Without
     a press it stays, so that the next press has the colours of the last one.
     """
 
@@ -90,7 +92,7 @@ class RangeLimitSmoother:
 
 
 def _end_for(value: float) -> float:
-    return HEADROOM * round_up(value / HEADROOM)
+    return HEADROOM * round_up(value / LIMIT)
 
 
 def extremes_mm(depth_mm: NDArray[np.float32]) -> tuple[float, float]:

@@ -157,3 +157,15 @@ def test_the_slope_view_is_the_angle_of_the_normals():
     normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], axis=-1)[None]
     found = shading.steepness_deg(normals.astype(np.float32))
     np.testing.assert_allclose(found, [[0.0, 30.0, 60.0]], atol=0.1)
+
+
+def test_a_stored_image_that_is_shown_by_itself_has_its_own_colour_range(dome, frame):
+    reconstruction = Reconstruction(dome)
+    processor = FrameProcessor(reconstruction)  # type: ignore[arg-type]
+    processor.wanted = FrameRequest(height=True)
+    ranges = []
+    for factor, paused in ((2.0, False), (1.0, False), (1.0, True), (1.0, False)):
+        deeper = replace(dome, depth_mm=np.float32(factor) * dome.depth_mm)
+        reconstruction.heightmap = deeper
+        ranges.append(processor(replace(frame, paused=paused)).range_mm[1])
+    assert ranges == pytest.approx([2.4, 2.4, 1.2, 2.4])

@@ -128,3 +128,19 @@ def test_a_camera_with_another_image_size_is_set_to_that_of_the_calibration(dept
         assert not shared.state.format.compressed
     finally:
         shared.detach(stream_reader)
+
+
+def test_all_pages_continue_one_colour_range_until_another_source_is_selected(
+    depth, context, qtbot
+):
+    other, owner = LiveSession(context=context, name="other page"), QWidget()
+    qtbot.addWidget(owner)
+    second = LiveDepth(other, JobQueue("other", other), owner, context=context)
+    press = np.full((40, 40), 0.9, np.float32)
+    for name in "AB":
+        camera = SimpleNamespace(kind="camera", name=name, detail="")
+        context.source.choose(camera)  # type: ignore[arg-type]
+        assert depth._maker.colour_range.update(0.5 * press, 0.0) == (0.0, pytest.approx(0.6))
+        assert depth._maker.colour_range.update(press, 0.1) == (0.0, pytest.approx(1.2))
+        assert second._maker.colour_range.update(0.5 * press, 0.2) == (0.0, pytest.approx(1.2))
+    second.finish()

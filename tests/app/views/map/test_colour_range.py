@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from app.views.map.colour_range import HEADROOM, LEAST_MM, SHRINK_AFTER_S, ColourRange
+from app.views.map.colour_range import HEADROOM, LEAST_MM, LIMIT, SHRINK_AFTER_S, ColourRange
 
 FRAME_S = 1.0 / 30.0
 
@@ -33,7 +33,17 @@ def _run(
 
 @pytest.mark.parametrize(
     ("depth_mm", "high_mm"),
-    [(0.0, 0.024), (0.03, 0.06), (0.48, 0.6), (0.52, 0.6), (0.98, 1.2), (1.02, 1.2), (2.5, 6.0)],
+    [
+        (0.0, 0.024),
+        (0.03, 0.06),
+        (0.48, 0.6),
+        (0.52, 0.6),
+        (0.61, 0.6),
+        (0.98, 1.2),
+        (1.02, 1.2),
+        (2.5, 2.4),
+        (2.6, 6.0),
+    ],
 )
 def test_presses_of_about_the_same_round_depth_have_the_same_range(depth_mm, high_mm):
     assert ColourRange().update(_press(depth_mm), 0.0) == (0.0, pytest.approx(high_mm))
@@ -63,7 +73,7 @@ def test_all_depths_have_colours_and_the_range_changes_rarely(depths):
     colours = ColourRange()
     shown = [colours.update(_press(d), k * FRAME_S)[1] for k, d in enumerate(depths)]
     assert all(
-        d <= high * (1.0 + 1e-6)
+        d <= high * LIMIT / HEADROOM * (1.0 + 1e-6)
         and float(f"{high / HEADROOM:.0e}") == pytest.approx(high / HEADROOM)
         for d, high in zip(depths, shown, strict=True)
     )
