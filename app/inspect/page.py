@@ -180,6 +180,7 @@ class InspectPage(QWidget):
         self.views.bench_area.choose_item()
 
     def _use_virtual_sensor(self) -> VirtualBench:
+        self.pause(False)
         bench = self.context.source.choose_virtual_sensor()
         use_virtual_calibration(self.jobs, context=self.context)
         self.views.bench.title.setChecked(True)
@@ -197,6 +198,7 @@ class InspectPage(QWidget):
         self.pause_action.setChecked(on)
         self.pause_action.setText("Continue" if on else "Freeze")
         self.replay.hold(self._shown.frame if on and self._shown is not None else None)
+        self.views.bench_area.hold(on)
         self.live.pause(on)
         self._want()
         self._advise()

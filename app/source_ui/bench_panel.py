@@ -84,11 +84,11 @@ class BenchPanel(QWidget):
         vbox(*self._faults.values(), of=faults)
         vbox(self._scene, self._hint, image, faults, None, of=self, margins=0)
         self.setMinimumWidth(236)
-        self._bench_changed.connect(self._show_bench)
+        self._bench_changed.connect(self.show_bench)
         # Methods, not lambdas, so that nothing keeps the panel alive once Qt has deleted it.
         forget = bench.watch(self._bench_changed.emit)
         self.destroyed.connect(lambda: forget())
-        self._show_bench()
+        self.show_bench()
 
     def choose_item(self) -> None:
         """Show the list of objects."""
@@ -116,7 +116,8 @@ class BenchPanel(QWidget):
         count = self._bench.steps("checkerboard")
         self._show_pose((self._bench.scene.pose + step) % count)
 
-    def _show_bench(self) -> None:
+    def show_bench(self) -> None:
+        """Show the objects and faults of now."""
         bench, scene, conditions = self._bench, self._bench.scene, self._bench.conditions
         deepest, reach = bench.depth_range_mm(scene), bench.reach_mm(scene)
         self._scene.limit("size_mm", *bench.size_range_mm())
@@ -167,6 +168,13 @@ class BenchArea(QWidget):
             self._panel = BenchPanel(bench=bench)
             self._column.addWidget(self._panel)
         return True
+
+    def hold(self, on: bool) -> None:
+        """Stay at the values of now while the image is frozen, or continue."""
+        self.setEnabled(not on)
+        if self._panel is not None:
+            self._panel.blockSignals(on)
+            self._panel.show_bench()
 
     def choose_item(self) -> None:
         """Show the list of objects."""
