@@ -9,7 +9,7 @@ from app.sources.player import Playback, Player
 from app.sources.source import SourceFrame
 from app.widgets.actions import Slot, icon_button, make_action
 from app.widgets.inputs import ComboBox, Slider
-from app.widgets.layout import hbox
+from app.widgets.layout import hbox, vbox
 from app.widgets.text_roles import named_label
 from app.widgets.timers import timer
 from app.widgets.widget_names import set_names
@@ -51,9 +51,8 @@ class ReplayBar(QWidget):
             Slider(Qt.Orientation.Horizontal), f"{page}.replay.seek", "Position"
         )
         self._slider.valueChanged.connect(self._seek)
-        row.addWidget(self._slider, 1)
         self._words = named_label(f"{page}.replay.words", "Current position", wrap=False)
-        row.addWidget(self._words)
+        row.addLayout(vbox(self._words, self._slider, spacing=0), 1)
         self._loop = set_names(QCheckBox("Loop"), f"{page}.replay.loop", "Start again at the end")
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
         self._speed = set_names(ComboBox(), f"{page}.replay.speed", "Speed")
