@@ -81,13 +81,13 @@ class SelectableMap(QWidget):
 
 
 class QualityPanel(SelectableMap):
-    """Shows flags, how well the depth explains the image, or the uncertainty while paused."""
+    """Shows flags, how well the depth explains the image, or the uncertainty of a frozen image."""
 
     def __init__(self, on_chosen: Slot) -> None:
         quantities = {
             "flags": "Flags",
             "misfit": "Misfit of the image",
-            "uncertainty": "Uncertainty (when paused)",
+            "uncertainty": "Uncertainty (when frozen)",
         }
         super().__init__("inspect.quality", "Quality", quantities, on_chosen)
         self._count = 0
@@ -99,7 +99,7 @@ class QualityPanel(SelectableMap):
         if self.what == "misfit" and result.misfit is None:
             return  # the frame is older than the selection
         if result.quality is None:
-            sentence = "Pause to see the uncertainty."
+            sentence = "Freeze the image to see the uncertainty."
             if still and result.without_uncertainty:
                 sentence = "This model gives no uncertainty. Calibrate with the full model."
             elif still:

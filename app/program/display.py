@@ -32,7 +32,7 @@ COLOUR_MAPS = {
 QUANTITIES = {
     "depth": "Depth",
     "slope": "Slope",
-    "uncertainty": "Uncertainty (when paused)",
+    "uncertainty": "Uncertainty (when frozen)",
     "flags": "Flags",
     "difference": "Difference from the reference",
 }

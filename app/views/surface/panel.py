@@ -115,12 +115,8 @@ class SurfacePanel(QWidget):
         self._why = named_label("view3d.reason", "Why 3D is not available")
         self._why.hide()
         self.tools = set_names(QWidget(), "view3d.bar", "View directions")
-        fit = tool_button(
-            "view3d.fit",
-            "Reset",
-            lambda: self.view_from("fit"),
-            tip="Show the whole surface (double click)",
-        )
+        tip, show_all = "Show the whole surface (double click)", lambda: self.view_from("fit")
+        fit = tool_button("view3d.fit", "Fit", show_all, tip=tip)
         options = set_names(QToolButton(), "view3d.menu", "3D menu", "Options of the 3D view")
         options.setText("Options")
         options.setAutoRaise(True)
