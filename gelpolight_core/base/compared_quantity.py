@@ -61,7 +61,7 @@ def value_text(value: float, sd: float | None = None, unit: str = "mm", *, sign:
     Parameters
     ----------
     value, sd : float
-        The value and its standard uncertainty.
+        The value and its standard or expanded uncertainty.
     unit : str, optional
         Their unit, as in names.
     sign : str, optional
@@ -203,21 +203,22 @@ class Quantity:
         if not self.decision:
             return ""
         en = "" if self.en is None else f", En {self.en:.2f}"
-        text = f"{self.decision}, tolerance {self.limit_percent:g} %{en}"
-        if self.explained or self.verdict is Verdict.FAIL:
-            return text
-        return f"{text}. The deviation is larger than the uncertainties explain"
+        is_settled = self.explained or self.verdict is Verdict.FAIL
+        doubt = "" if is_settled else ". The deviation is larger than the uncertainties explain"
+        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}{doubt}"
 
     @property
     def sentence(self) -> str:
-        """The comparison as one line, or "" without truth or tolerance."""
+        """The comparison as one line, all uncertainties with k = 2, or "" if it is not judged."""
         if self.verdict is None or self.truth is None:
             return ""
         percent = 100.0 * self.deviation_expanded / self.truth
-        uncertainty = f" ± {percent:.2f} %" if percent else ", uncertainty unknown"
+        known = f" ± {percent:.2f} % (k = {COVERAGE:g})" if percent else ", uncertainty unknown"
+        measured = value_text(self.value, self.expanded, self.unit)
+        true = value_text(self.truth, unit=self.unit)
         return (
-            f"{self.label}: measured {self.text}, true {value_text(self.truth, unit=self.unit)}, "
-            f"deviation {self.error_percent:+z.2f} %{uncertainty}: {self.judgement}"
+            f"{self.label.capitalize()}: measured {measured}, true {true}, "
+            f"deviation {self.error_percent:+z.2f} %{known}: {self.judgement}"
         )
 
     def as_json(self) -> dict[str, Any]:
@@ -258,9 +259,8 @@ def guarded(
     finding = judge(
         key, text, deviation, "%", warn=limit - expanded, fail=limit + expanded, remedy=remedy
     )
-    if finding.verdict is not Verdict.WARN:
-        return finding
-    return replace(finding, remedy="The uncertainty is too large to decide")
+    undecided = replace(finding, remedy="The uncertainty is too large to decide")
+    return undecided if finding.verdict is Verdict.WARN else finding
 
 
 def percent_error(measured: float, true: float) -> float:

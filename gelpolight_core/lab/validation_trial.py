@@ -120,9 +120,7 @@ def press_lines(press: ReferencePress, limits_percent: tuple[float, float]) -> t
     if measurement is None:
         return str(press.outcome), "warn"
     comparisons = compared_lengths(press, limits_percent)
-    lines = [quantity.sentence for quantity in comparisons]
-    rows = [line[:1].upper() + line[1:] for line in lines]
-    rows += [finding.line for finding in press.truth.findings()]
+    rows = [*(q.sentence for q in comparisons), *(f.line for f in press.truth.findings())]
     if measurement.verdict == "ok":
         return "\n".join(rows), worst_decision(comparisons).value
     rows.append(f"Low confidence: {measurement.reason}. Retake this press or leave it out.")

@@ -79,6 +79,14 @@ class Validation:
         return max(abs(c.error_percent or 0.0) for c in self.comparisons)
 
     @property
+    def basis(self) -> str:
+        """How often and on how many objects, such as "2 presses of 1 object"."""
+        heights = sum(compared.label == "height" for compared in self.comparisons)
+        presses = max(heights, len(self.comparisons) - heights)
+        objects = 1 + self.indenter.count(";")
+        return f"{presses} press{'es' * (presses > 1)} of {objects} object{'s' * (objects > 1)}"
+
+    @property
     def what_decides(self) -> str:
         """What would decide the length with the largest uncertainty. Empty if all are decided."""
         undecided = {
@@ -105,10 +113,10 @@ class Validation:
         """Return it in words: verdict, object and origin, each length, and what would decide."""
         time = parse_time(self.when)
         day = self.when if time is None else f"{time.astimezone():%Y-%m-%d %H:%M}"
-        by = f"by {self.who}" if self.who else ""
-        head = f"{WORDS[self.verdict]}: {self.indenter}, {day} {by}".rstrip()
-        sentences = [quantity.sentence for quantity in self.comparisons]
-        return [head, *sentences, *filter(None, (self.what_decides,))]
+        by = f" by {self.who}" if self.who else ""
+        lines = [f"{WORDS[self.verdict]}: {self.indenter}, {day}{by}"]
+        lines += [compared.sentence for compared in self.comparisons]
+        return [*lines, self.what_decides] if self.what_decides else lines
 
     def as_json(self) -> dict[str, Any]:
         """Return the validation as plain values."""
@@ -130,10 +138,9 @@ class Validation:
 
 def worst_decision(comparisons: Sequence[Quantity]) -> Verdict:
     """Return the worst decision on lengths, a failure where one is missing or not judged."""
-    findings = [quantity.finding for quantity in comparisons]
-    judged = tuple(finding for finding in findings if finding is not None)
-    all_judged = bool(judged) and len(judged) == len(findings)
-    return QualityTable(judged).verdict if all_judged else Verdict.FAIL
+    judged = tuple(compared.finding for compared in comparisons if compared.finding is not None)
+    is_complete = judged and len(judged) == len(comparisons)
+    return QualityTable(judged).verdict if is_complete else Verdict.FAIL
 
 
 def validation_path(calibration: Path) -> Path:
@@ -164,9 +171,7 @@ def validation_in(manifest: Mapping[str, Any], path: Path) -> Validation | None:
         with suppress(InputError):
             beside = validation_path(path)
             validation = read_program_file(beside, (FORMAT, VERSION), _parse, found="({error})")
-    if validation is None or validation.identity != manifest["identity"]:
-        return None
-    return validation
+    return validation if validation and validation.identity == manifest["identity"] else None
 
 
 def _parse(content: Any) -> Validation:
@@ -198,8 +203,7 @@ def _sd(value: Any) -> float | None:
 
 
 def _positive(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{short_repr(value)} is not a number")
-    if not 0.0 < value < 1e15:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not 0.0 < value < 1e15:
         raise ValueError(f"{short_repr(value)} is not a length")
     return float(value)

@@ -82,3 +82,18 @@ def test_what_decides_names_the_largest_part_and_a_tolerance_that_is_enough(
     assert judged.verdict is Verdict.PASS
     assert Quantity(name, 1.01, 0.029, 1.0, enough - 0.1, truth_sd).verdict is Verdict.WARN
     assert Validation("id", "", "", "x", (decided,)).what_decides == ""
+
+
+@pytest.mark.function("Read how often and on how many objects a calibration was validated")
+@pytest.mark.parametrize(
+    ("objects", "names", "basis"),
+    [
+        ("Ball, 5 mm", ["diameter"], "1 press of 1 object"),
+        ("Cylinder, 5 mm", ["diameter", "height"], "1 press of 1 object"),
+        ("Cylinder, 5 mm", ["diameter", "height"] * 2, "2 presses of 1 object"),
+        ("Cylinder, 5 mm; Cuboid, 4 mm", ["diameter", "height", "side"], "2 presses of 2 objects"),
+    ],
+)
+def test_a_validation_counts_its_presses_and_objects(objects, names, basis):
+    compared = tuple(Quantity(name, 5.0, 0.01, 5.0, 5.0) for name in names)
+    assert Validation("id", "", "", objects, compared).basis == basis

@@ -1,6 +1,7 @@
 """References with their uncertainty, and the decision on what was measured beside them."""
 
 import math
+import re
 from dataclasses import replace
 from datetime import date, timedelta
 
@@ -185,3 +186,12 @@ def test_a_deviation_without_known_uncertainty_does_not_claim_to_have_none():
     stated = Quantity("height_mm", 1.02, 0.01, 1.0, 8.0)
     assert "uncertainty unknown" in unknown.sentence and "0.00 %" not in unknown.sentence
     assert "+2.00 % \N{PLUS-MINUS SIGN} 2.00 %" in stated.sentence
+
+
+def test_all_uncertainties_of_a_comparison_have_the_coverage_factor_that_it_states():
+    compared = Quantity("diameter_mm", 4.974, 0.078, 5.0, 5.0)
+    numbers = [float(n) for n in re.findall(r"± ([\d.]+)", compared.sentence)]
+    length_mm, percent = numbers
+    assert length_mm == pytest.approx(2.0 * 0.078, abs=0.005)
+    assert percent == pytest.approx(100.0 * length_mm / 5.0, abs=0.1)
+    assert compared.sentence.count("k = 2") == 1

@@ -322,7 +322,7 @@ def stated_validation(c: Calibration) -> ValidationSummary:
     """Return what a calibration says of its validation."""
     if c.validation is not None:
         lines, verdict = c.validation.lines(), c.validation.verdict
-        return ValidationSummary("; ".join(lines), verdict, data=c.validation.as_json())
+        return ValidationSummary(". ".join(lines).rstrip("."), verdict, data=c.validation.as_json())
     sentence = (
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
         "diameter, square size or scale makes every result wrong, and no image can show this"
