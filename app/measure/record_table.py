@@ -7,7 +7,7 @@ from dataclasses import replace
 from app.widgets.cells_table import TableCell
 from app.widgets.icons import tool_icon
 from gelpolight_core.base.compared_quantity import DECISIONS, Quantity, value_text
-from gelpolight_core.base.finding import Verdict
+from gelpolight_core.base.finding import QualityTable, Verdict
 from gelpolight_core.lab.measurement_record import DOUBTFUL, FILE, STORED, MeasurementRecord
 from gelpolight_core.measurement.tools.tool_registry import palette_entry
 
@@ -35,8 +35,8 @@ def verdict_role(role: str, *quantities: Quantity, doubtful: bool = False) -> st
     doubtful : bool, optional
         Whether the measurement or its reference is.
     """
-    explained = all(quantity.explained for quantity in quantities)
-    return "warn" if role == Verdict.PASS and (doubtful or not explained) else role
+    judged = QualityTable(tuple(f for quantity in quantities for f in quantity.findings))
+    return "warn" if role == Verdict.PASS and (doubtful or judged.verdict != role) else role
 
 
 def shape_label(shape: str) -> str:

@@ -174,11 +174,6 @@ class Quantity:
         return abs(self.error) / self.deviation_expanded
 
     @property
-    def explained(self) -> bool:
-        """Whether its uncertainty explains the deviation: En is at most 1, or not known."""
-        return self.en is None or self.en <= 1.0
-
-    @property
     def finding(self) -> Finding | None:
         """The decision by the tolerance, or None without truth or tolerance."""
         if self.truth is None or self.error_percent is None or self.limit_percent is None:
@@ -186,6 +181,15 @@ class Quantity:
         expanded = abs(100.0 * self.deviation_expanded / self.truth)
         text = f"Deviation of {self.label}"
         return guarded("deviation", text, abs(self.error_percent), self.limit_percent, expanded)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The decision, and En where the uncertainties do not explain what is not beyond it."""
+        found = () if self.finding is None else (self.finding,)
+        if self.en is None or self.en <= 1.0 or self.verdict in (None, Verdict.FAIL):
+            return found
+        remedy = "The deviation is larger than the uncertainties explain"
+        return (*found, judge("en", f"En of {self.label}", self.en, warn=1.0, remedy=remedy))
 
     @property
     def verdict(self) -> Verdict | None:
@@ -203,9 +207,8 @@ class Quantity:
         if not self.decision:
             return ""
         en = "" if self.en is None else f", En {self.en:.2f}"
-        is_settled = self.explained or self.verdict is Verdict.FAIL
-        doubt = "" if is_settled else ". The deviation is larger than the uncertainties explain"
-        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}{doubt}"
+        doubts = (f". {finding.remedy}" for finding in self.findings[1:])
+        return f"{self.decision}, tolerance {self.limit_percent:g} %{en}{''.join(doubts)}"
 
     @property
     def sentence(self) -> str:

@@ -99,14 +99,14 @@ class Finding:
             return "unknown"
         whole = abs(self.value) >= 1000.0 or (not self.unit and self.value == round(self.value))
         value = 0.0 if abs(self.value) < TINY else self.value
-        return f"{value:{'.0f' if whole else '.3g'}} {self.unit}".rstrip()
+        return _with_unit(f"{value:{'.0f' if whole else '.3g'}}", self.unit)
 
     @property
     def limit_text(self) -> str:
         """The limit up to which it passes, such as "≤ 0.3 px". Empty if it has none."""
         limit = self.warn_limit if self.warn_limit is not None else self.fail_limit
         sign = "≥" if self.higher_is_better else "≤"
-        return "" if limit is None else f"{sign} {limit:.4g} {self.unit}".rstrip()
+        return "" if limit is None else _with_unit(f"{sign} {limit:.4g}", self.unit)
 
     @property
     def line(self) -> str:
@@ -160,6 +160,10 @@ def doubtful_finding(key: str, text: str) -> Finding:
 def join_reasons(findings: Iterable[Finding]) -> str:
     """Return why something is doubtful, as the texts of all findings."""
     return "; ".join(finding.text for finding in findings)
+
+
+def _with_unit(number: str, unit: str) -> str:
+    return f"{number}\N{DEGREE SIGN}" if unit == "deg" else f"{number} {unit}".rstrip()
 
 
 def _sentences(text: str, remedy: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -178,12 +179,10 @@ class Measurement:
             q for q in compare_with_truth(self, truth, limits_percent) if q.truth is not None
         ]
         errors = whole and {q.name: q.error_percent for q in compared}
-        size: dict[str, Any] = {"diameter_mm": self.diameter_mm}
-        if self.side_mm is not None:
-            size = {"side_mm": list(self.side_mm)}
+        side_mm, diameter = self.side_mm, {"diameter_mm": self.diameter_mm}
         return {
             "shape": self.shape,
-            **size,
+            **(diameter if side_mm is None else {"side_mm": list(side_mm)}),
             "height_mm": self.height_mm,
             "centre_mm": list(self.centre_mm),
             "yaw_deg": self.yaw_deg,
@@ -220,6 +219,8 @@ class MeasuredPress:
         Judged with the height map.
     truth : ReferenceObject or None
         The reference, if one is known.
+    time : datetime
+        When it was measured.
     """
 
     name: str
@@ -227,12 +228,11 @@ class MeasuredPress:
     height_map: HeightMap
     measurement: Measurement
     truth: ReferenceObject | None = None
+    time: datetime = field(default_factory=lambda: datetime.now(UTC))
 
 
 def _plain(spread: dict[str, Any] | None) -> dict[str, Any] | None:
-    if spread is None:
-        return None
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
+    return spread and {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
 
 
 def compare_with_truth(

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from gelpolight_core.base.compared_quantity import COVERAGE, SOURCES, TOLERANCE_PERCENT, Quantity
-from gelpolight_core.base.finding import QualityTable
+from gelpolight_core.base.finding import QualityTable, join_quality_tables
 from gelpolight_core.calibration.recipe import Facts
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.result import MeasuredPress, compare_with_truth
@@ -49,7 +49,6 @@ def measurement_report(
     colours : (256, 3) uint8, optional
         Colours of the height maps.
     """
-    created = datetime.now().astimezone().isoformat(timespec="seconds")
     about = (
         "U is the expanded uncertainty (k = 2, about 95 %) of the deviation from the reference, or "
         "of the value without one. The object conforms where deviation and U together are within "
@@ -59,20 +58,20 @@ def measurement_report(
         _section(image, limits_percent, "" if number else about, colours)
         for number, image in enumerate(images)
     )
-    validation = stated_validation(calibration)
-    figures = [figure for section in sections for figure in section.quality.figures]
+    quality = join_quality_tables(section.quality for section in sections)
     # Without a reference there is nothing to decide.
-    judged = any(figure.key == "deviation" for figure in figures)
-    measured = ("Measured", f"{created.replace('T', ' ')}, {operator}".rstrip(", "))
+    judged = any(figure.key == "deviation" for figure in quality.figures)
+    why = "; ".join(quality.remedies)
+    by = (("Measured by", operator),) if operator else ()
     of_calibration = ("Verdict of the calibration", calibration.verdict.word)
     return Report(
         title=f"Measurement with sensor {calibration.serial}",
-        verdict=QualityTable(tuple(figures)).verdict if judged else None,
+        verdict=quality.verdict if judged else None,
         sections=sections,
-        cause="" if judged else "No decision: no true value of a measured quantity is stated",
-        facts=(measured, *head_facts(calibration), of_calibration),
-        validation=validation,
-        created=created,
+        cause=why if judged else "No decision: no true value of a measured quantity is stated",
+        facts=(*by, *head_facts(calibration), of_calibration),
+        validation=stated_validation(calibration),
+        created=datetime.now().astimezone().isoformat(timespec="seconds"),
         data={
             "calibration": calibration.identity,
             "coverage_factor": COVERAGE,
@@ -92,7 +91,7 @@ def _section(
     colours: ColourTable | None,
 ) -> ReportSection:
     quantities = compare_with_truth(image.measurement, image.truth, limits_percent)
-    decisions = [quantity.finding for quantity in quantities if quantity.finding is not None]
+    decisions = [finding for quantity in quantities for finding in quantity.findings]
     reference = () if image.truth is None else image.truth.findings()
     return ReportSection(
         image.name,
@@ -108,6 +107,7 @@ def _section(
 def _facts(image: MeasuredPress) -> Facts:
     measurement, truth = image.measurement, image.truth or ReferenceObject(image.measurement.shape)
     reference = (
+        ("Measured", f"{image.time.astimezone():%Y-%m-%d %H:%M:%S}"),
         ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*measurement.centre_mm)),
         ("Edge radius", number_text(measurement.edge_radius_mm, ".3f", " mm")),
         ("Decay length of the membrane", f"{measurement.drape_decay_mm:.3f} mm"),

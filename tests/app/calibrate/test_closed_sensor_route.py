@@ -64,7 +64,7 @@ def test_from_the_first_question_to_a_validated_calibration(
     assert technician.state("balls") in ("pass", "warn")
     progress = wizard.open.progress
     assert progress.error_deg < 4.0
-    assert wizard.panel.number.text() == f"{progress.error_deg:.3g} deg"
+    assert wizard.panel.number.text() == f"{progress.error_deg:.3g}\N{DEGREE SIGN}"
     captures = wizard.open.captures()
     (refused,) = [capture for capture in captures if capture.state == "fail"]
     assert refused.finding.sentence, "an image that shows no ball keeps its reason"

@@ -68,7 +68,7 @@ def figure(value: float, **limits: object) -> Finding:
     [
         (figure(math.nan), "unknown"),
         (figure(16.0), "16"),
-        (figure(1.41e-16, unit="deg"), "0 deg"),
+        (figure(1.41e-16, unit="deg"), "0\N{DEGREE SIGN}"),
         (figure(12345.6, unit="px"), "12346 px"),
         (figure(0.00483, unit="%"), "0.00483 %"),
     ],

@@ -3,6 +3,7 @@
 import re
 import subprocess
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from shutil import which
@@ -201,7 +202,10 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(value, warn, gap, highe
     assert figure.limit_text.startswith(sign)
 
 
-@pytest.mark.parametrize(("size_mm", "verdict"), [(0.0, None), (2.0, "pass")])
+@pytest.mark.parametrize(
+    ("size_mm", "verdict"),
+    [(0.0, None), (2.0, "pass"), (2.04, "warn")],  # 2 % off conforms, but En is 2
+)
 def test_a_certificate_passes_only_what_was_compared(size_mm, verdict, tmp_path):
     axis, flat = np.arange(-4.0, 5.0), np.zeros((9, 9), np.float32)
     heightmap = HeightMap(
@@ -214,13 +218,17 @@ def test_a_certificate_passes_only_what_was_compared(size_mm, verdict, tmp_path)
         baseline_mm=0.0, residual_rms_mm=0.001, outline_mm=np.zeros((3, 2)),
     )  # fmt: skip
     truth = ReferenceObject("ball", size_mm)
-    report = measurement_report(small(), [MeasuredPress("p.png", "ab", heightmap, ball, truth)])
-    assert (report.verdict, bool(report.cause)) == (verdict, not size_mm)
+    time = datetime(2026, 3, 1, 10, tzinfo=UTC)
+    press = MeasuredPress("p.png", "ab", heightmap, ball, truth, time)
+    report = measurement_report(small(), [press])
+    assert (report.verdict, bool(report.cause)) == (verdict, verdict != "pass")
+    measured = datetime.fromisoformat(dict(report.sections[0].facts)["Measured"]).astimezone()
+    assert measured == time, "not when it was printed"
     assert dict(report.facts)["Verdict of the calibration"] == small().verdict.word
     assert dict(report.sections[0].facts)["SHA-256 of the image"] == "ab"
     path = written(report, tmp_path)
     assert report_data(path)["verdict"] == verdict
-    badge = "\N{CHECK MARK} Pass" if verdict else "No decision"
+    badge = {"pass": "\N{CHECK MARK} Pass", "warn": "! Warning", None: "No decision"}[verdict]
     assert report_text(path).startswith(f"{report.title} {badge}")
 
 
