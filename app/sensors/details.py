@@ -162,8 +162,7 @@ class TitledTable(QWidget, Generic[ItemT]):
         self.action.setEnabled(self.table.chosen() is not None)
 
     def _choose(self) -> None:
-        item = self.table.chosen()
-        if item is not None:
+        if (item := self.table.chosen()) is not None:
             self._on_chosen(self._path(item))
 
 

@@ -21,7 +21,7 @@ from app.program.preferences import WarningLimits
 from app.program.workspace import copy_file
 from app.widgets.actions import action_button, make_action
 from app.widgets.cells_table import CellsTable, TableCell
-from app.widgets.dialog import Kinds, ask
+from app.widgets.dialog import ask
 from app.widgets.layout import hbox, splitter, vbox
 from app.widgets.text_roles import stack_over_text
 from app.widgets.time_chart import DEPTH, PLANE, ChartSeries
@@ -111,10 +111,10 @@ NO_SENSOR = (
     "window."
 )
 MEASURE_FIRST = (
-    "Its session is not here, and no saved measurement counts. On the Measure page, measure new "
-    "presses, state the true sizes, and save each measurement. Then choose Validate again."
+    "Its session is not here, and no saved measurement counts{why}. On the Measure page, measure "
+    "new presses, state the true sizes, and save each measurement. Then choose Validate again."
 )
-"""Validation without session and measurements."""
+"""Validation without session and measurements, with why those that are saved do not count."""
 
 
 class SensorsPage(QWidget):
@@ -207,8 +207,7 @@ class SensorsPage(QWidget):
 
     def _choose_report(self, entry: CalibrationEntry) -> None:
         settings, name = self._context.settings, f"{entry.path.stem}-report.pdf"
-        path = ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)")
-        if path is not None:
+        if path := ask_save(self, settings, "report", "Save the report", name, "PDF (*.pdf)"):
             self._write_report(entry, path)
 
     def _write_report(self, entry: CalibrationEntry, path: Path) -> None:
@@ -302,8 +301,10 @@ class SensorsPage(QWidget):
         measure = "&Measure", partial(self._measure, entry)
         with context.toasts.errors():
             limits = context.settings.limits.percent
-            if (trial := recorded_validation(context.workspace.records, summary, limits)) is None:
-                ask(self, "Validate", MEASURE_FIRST, measure)
+            trial = recorded_validation(context.workspace.records, summary, limits)
+            if isinstance(trial, str):
+                why = f" ({trial})" if trial else ""
+                ask(self, "Validate", MEASURE_FIRST.format(why=why), measure)
             else:
                 record = "&Record this validation", partial(self._record, trial, entry.path)
                 ask(self, "Validate", "\n".join(trial.lines()), record, measure)
@@ -321,8 +322,7 @@ class SensorsPage(QWidget):
 
     def _save_copy(self, entry: CalibrationEntry) -> None:
         settings, name = self._context.settings, entry.path.name
-        path = ask_save(self, settings, "calibration", "Save a copy", name, PATTERNS)
-        if path is not None:
+        if path := ask_save(self, settings, "calibration", "Save a copy", name, PATTERNS):
             with self._context.toasts.errors():
                 copy_file(entry.path, path)
 
@@ -343,9 +343,7 @@ class SensorsPage(QWidget):
         if entry.validated:
             text += " It is validated."
         answer = "Move to trash", partial(self._remove, entry)
-        cancel = ask(self, "Remove calibration", text, answer).buttons.button(Kinds.Cancel)
-        cancel.setDefault(True)
-        cancel.setFocus()
+        ask(self, "Remove calibration", text, answer).prefer_cancel()
 
     def _remove(self, entry: CalibrationEntry) -> None:
         toasts = self._context.toasts
@@ -355,8 +353,7 @@ class SensorsPage(QWidget):
         self._context.requests.calibrations_changed.emit()
 
     def _with_chosen(self, function: Callable[[CalibrationEntry], None]) -> None:
-        entry = self.chosen()
-        if entry is not None:
+        if (entry := self.chosen()) is not None:
             function(entry)
 
 

@@ -106,6 +106,12 @@ class QuestionDialog(Dialog):
         set_names(self.buttons.button(Kinds.Cancel), "question.cancel", "Cancel")
         self.fill(text_label)
 
+    def prefer_cancel(self) -> None:
+        """Let Enter choose Cancel: the answers discard something."""
+        cancel = self.buttons.button(Kinds.Cancel)
+        cancel.setDefault(True)
+        cancel.setFocus()
+
     def require_text(self, hint: str, most: int) -> QLineEdit:
         """Add a line of text without which no answer can be chosen. Return it."""
         line = set_names(

@@ -256,8 +256,7 @@ class MainWindow(QMainWindow):
         before = self._stack.currentWidget()
         if after is before:
             return
-        if before is not None:
-            _call(before, "leave")
+        _call(before, "leave")
         self._stack.setCurrentWidget(after)
         self._show_in_use()  # other programs may have changed the workspace
         _call(after, "enter")
@@ -287,13 +286,8 @@ class MainWindow(QMainWindow):
         if what in BEGINNINGS:
             name, method = BEGINNINGS[what]
             self._with_page(name, lambda page: _call(page, method))
-            return
-        ask = {
-            "source": self.choose_source,
-            "session": self.choose_session,
-            "files": self.choose_files,
-        }
-        ask[what]()
+        else:
+            _call(self, f"choose_{what}")
 
     def choose_source(self) -> None:
         """Let the user choose another source, whose images are shown at once."""
@@ -441,14 +435,13 @@ class MainWindow(QMainWindow):
         work = " ".join(_call(page, "unfinished", default="") for page in self._made.values())
         if work.strip() and not self._ends_work:
             event.ignore()
-            ask(self, "Close the program?", work.strip(), ("Close", self._close_anyway))
+            close = "Close anyway", self._close_anyway
+            ask(self, "Close the program?", work.strip(), close).prefer_cancel()
             return
         if not all(_call(page, "can_close", default=True) for page in self._made.values()):
             event.ignore()
             return
-        visible = self._stack.currentWidget()
-        if visible is not None:
-            _call(visible, "leave")
+        _call(self._stack.currentWidget(), "leave")
         settings = self.context.settings
         settings.keep_window_state(self.saveGeometry(), self.saveState(LAYOUT_VERSION))
         settings.save()
@@ -460,7 +453,7 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
 
-def _call(page: QWidget, method: str, *arguments: Any, default: Any = None) -> Any:
+def _call(page: QWidget | None, method: str, *arguments: Any, default: Any = None) -> Any:
     """Call a method if the page has it."""
     function = getattr(page, method, None)
     return default if function is None else function(*arguments)

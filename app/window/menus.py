@@ -58,8 +58,7 @@ class EditMenu(QMenu):
         return history
 
     def _act(self, change: Callable[[QUndoStack], None]) -> None:
-        stack = self._history()
-        if stack is not None:
+        if (stack := self._history()) is not None:
             change(stack)
 
 
@@ -98,8 +97,7 @@ class RecentMenu(QMenu):
             self._context.settings.add_recent("recordings", info.file)
 
     def _note_calibration(self) -> None:
-        used = self._context.workspace.in_use
-        if used is not None:
+        if used := self._context.workspace.in_use:
             self._context.settings.add_recent("calibrations", used)
 
     def _fill(self) -> None:
@@ -142,6 +140,7 @@ class ExportMenu(QMenu):
     def __init__(self, parent: QWidget, visible_page: VisiblePage) -> None:
         super().__init__("&Export", parent)
         set_names(self, "file.export", "Export")
+        self.setToolTipsVisible(True)
         self._visible_page = visible_page
         self.aboutToShow.connect(self._fill)
 

@@ -139,9 +139,7 @@ class StateBar(QToolBar):
 
 def rate_text(rate_hz: float | None, lost: int | None) -> str:
     """Return the frames per second and the number of lost frames. Empty if there is no camera."""
-    if rate_hz is None:
-        return ""
-    return f"{rate_hz:.0f} frames/s, {lost or 0} lost"
+    return "" if rate_hz is None else f"{rate_hz:.0f} frames/s, {lost or 0} lost"
 
 
 class FailedCalibrationBar(PlainLabel):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -54,11 +55,12 @@ def validate(
 
 def recorded_validation(
     store: Store, calibration: CalibrationSummary, limits_percent: tuple[float, float]
-) -> Validation | None:
-    """Return the validation of a calibration from its saved measurements, or None if none counts.
+) -> Validation | str:
+    """Return the validation of a calibration from its saved measurements, or why none counts.
 
     A measurement counts if it is of an object of stated size, is not doubtful, and its image is
-    a file that the calibration was not made from. Whether it conforms makes no difference.
+    a file that the calibration was not made from. Whether it conforms makes no difference. Why
+    none counts is empty if none of this sensor was saved.
 
     Parameters
     ----------
@@ -75,17 +77,34 @@ def recorded_validation(
         If the records or an image cannot be read.
     """
     objects, comparisons = dict[str, None](), list[Quantity]()
-    for record in store.all(MeasurementRecord, calibration_id=calibration.identity):
-        file = Path(str(record.settings.get(FILE, "")))
+    refused = Counter[str]()
+    for record in store.all(MeasurementRecord, serial=calibration.serial):
         compared = [q for q in record.quantities if q.truth is not None]
-        is_trusted = record.shape in SHAPES and record.verdict != DOUBTFUL and file.is_file()
-        if compared and is_trusted and file_hash(file) not in calibration.sources:
+        if fault := _why_not_counted(record, calibration):
+            refused[fault] += 1
+        else:
             sizes = ", ".join(f"{q.label} {q.truth:g} mm" for q in compared)
             objects[f"{SHAPES[record.shape]}, {sizes}"] = None
             for q in compared:
                 limit = limits_percent[q.label == "height"]
                 comparisons.append(replace(q, name=q.label, limit_percent=limit))
-    return _validation(calibration.identity, objects, comparisons) if comparisons else None
+    if comparisons:
+        return _validation(calibration.identity, objects, comparisons)
+    return "; ".join(f"{fault}: {count}" for fault, count in refused.items())
+
+
+def _why_not_counted(record: MeasurementRecord, calibration: CalibrationSummary) -> str:
+    file = Path(str(record.settings.get(FILE, "")))
+    if record.calibration_id != calibration.identity:
+        return "measured with another calibration"
+    if record.shape not in SHAPES or all(q.truth is None for q in record.quantities):
+        return "not an object of stated size"
+    if record.verdict == DOUBTFUL:
+        return "doubtful"
+    if not file.is_file():
+        return "its image is not a file"
+    used = file_hash(file) in calibration.sources
+    return "the calibration was made from its image" if used else ""
 
 
 def _validation(
@@ -106,10 +125,7 @@ def is_recordable(presses: Iterable[ReferencePress], validation: Validation) -> 
     validation : Validation
         From them.
     """
-    measured = [press.measurement for press in presses]
-    trusted = all(
-        measurement is not None and measurement.verdict == "ok" for measurement in measured
-    )
+    trusted = all(press.measurement and press.measurement.verdict == "ok" for press in presses)
     failed = bool(validation.comparisons) and validation.verdict is Verdict.FAIL
     return trusted or failed
 

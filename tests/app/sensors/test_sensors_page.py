@@ -1,6 +1,7 @@
 """The Sensors page: the library as a technician sees and uses it."""
 
 import shutil
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -294,13 +295,15 @@ def test_saved_measurements_validate_a_calibration_without_its_session(
     assert asked.args == ["measure"] and context.workspace.in_use == path
     image = tmp_path / "press.png"
     image.write_bytes(b"a press")
-    context.workspace.records.add(
-        MeasurementRecord(
-            page.chosen().serial, page.chosen().summary.identity, "ball",
-            (Quantity("diameter_mm", 5.01, 0.01, 5.0, 5.0),), "pass",
-            settings={FILE: str(image)},
-        )
+    record = MeasurementRecord(
+        page.chosen().serial, page.chosen().summary.identity, "ball",
+        (Quantity("diameter_mm", 5.01, 0.01, 5.0, 5.0),), "pass", settings={FILE: str(image)},
     )  # fmt: skip
+    context.workspace.records.add(replace(record, verdict="doubtful"))
+    page.offered["validate"].trigger()
+    assert "doubtful: 1" in words(page)
+    answer(page, "answer0")
+    context.workspace.records.add(record)
     page.offered["validate"].trigger()
     answer(page, "answer0")
     assert read_entry(path).validated and page.chosen().validated

@@ -163,6 +163,7 @@ def test_closing_asks_once_if_work_of_a_page_would_end(window):
     assert not window.close()
     question = window.findChild(Dialog, "question")
     assert "Work is running." in question.findChild(QLabel, "question.text").text()
+    assert question.findChild(QPushButton, "question.cancel").isDefault(), "Enter loses nothing"
     question.reject()
     assert window.isVisible() and not window.close()
     window.findChild(Dialog, "question").findChild(QWidget, "question.answer0").click()
