@@ -18,7 +18,7 @@ BUTTONS = {
     "image_size": "Set the camera to this size",
     "reopen": "Reconnect",
     "zero": "Set to zero",
-    "live": "Back to the camera",
+    "live": "Back to the source",
 }
 """The text of the button of every action. An advice with such a key has a button."""
 OF_CALIBRATION = ("fitting", "calibrate", "sensors", "same_camera", "image_size")

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from gelpolight_core.geometry.membrane_shape import FLAT, MembraneShape
 from gelpolight_core.measurement.result import Measurement
 
 if TYPE_CHECKING:
     import pyvista as pv
 
 
-def solid_of(measurement: Measurement) -> pv.PolyData:
+def solid_of(measurement: Measurement, at_rest: MembraneShape = FLAT) -> pv.PolyData:
     """Return the pressed-in part of a fitted object, from the membrane's level to its top.
 
     Parameters
     ----------
     measurement : Measurement
         A cylinder, cuboid or ball.
+    at_rest : MembraneShape, optional
+        The undeformed membrane, over which the depth counts.
     """
     import pyvista as pv  # already loaded by the 3D view, which calls this
 
     x, y = measurement.centre_mm
-    low, height = measurement.baseline_mm, measurement.height_mm
+    low = measurement.baseline_mm - float(at_rest.height(np.array(measurement.centre_mm)))
+    height = measurement.height_mm
     middle = (x, -y, low + 0.5 * height)
     if measurement.shape == "cuboid":
         assert measurement.side_mm is not None

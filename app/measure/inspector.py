@@ -100,8 +100,9 @@ class ReferenceForm(QWidget):
             self._offer()
         self.setEnabled(bool(state.kind))
         self.form.rename_row("size_mm", state.asked or "Size")
-        if isinstance(field := self.form.inputs["size_mm"], NumberField):
-            field.setSuffix(unit_behind(state.unit))
+        for name in ("size_mm", "size_expanded_mm"):
+            if isinstance(field := self.form.inputs[name], NumberField):
+                field.setSuffix(unit_behind(state.unit))
 
     def state(self, stated: ReferenceObject) -> None:
         """Enter values from code, as if the user had chosen them."""
@@ -120,12 +121,8 @@ class ReferenceForm(QWidget):
 
     def _listed(self, kind: str, name: str) -> ReferenceObject | None:
         """Return the listed values of an object, or None if it is not in the list."""
-        listed = (
-            reference
-            for reference in (*self._given, *self._objects)
-            if (reference.shape, reference.name) == (kind, name)
-        )
-        return next(listed, None)
+        listed = {(one.shape, one.name): one for one in (*self._objects, *self._given)}
+        return listed.get((kind, name))
 
     def _on_known(self) -> None:
         name = self.known.currentData()

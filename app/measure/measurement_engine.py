@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 
@@ -56,12 +57,15 @@ class MeasuredImage:
         The frame of the camera. None for a file.
     serial : str
         Serial of its sensor. Empty if unknown.
+    time : datetime
+        When it was frozen or opened.
     """
 
     name: str
     path: Path | None = None
     frame: SourceFrame | None = None
     serial: str = ""
+    time: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def image(self, response: CameraResponse | None) -> LinearImage:
         """Return it as linear light.

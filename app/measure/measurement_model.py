@@ -194,12 +194,10 @@ class MeasurementModel(QObject):
     def nudge(self, dx_mm: float, dy_mm: float) -> bool:
         """Move the handle selected for the keys. Return whether there is one."""
         tool = self._sheet.get(self.chosen)
-        selected = (
-            next((g for g in tool_handles(tool) if g.name == self.grip), None) if tool else None
-        )
-        if tool is None or selected is None:
+        grips = {} if tool is None else {grip.name: grip.at for grip in tool_handles(tool)}
+        if tool is None or self.grip not in grips:
             return False
-        x, y = selected.at
+        x, y = grips[self.grip]
         self.change(self.chosen, move_handle(tool, self.grip, (x + dx_mm, y + dy_mm)), nudge=True)
         return True
 

@@ -61,6 +61,7 @@ class IndentersDialog(Dialog):
             button.setAutoDefault(False)
         names = vbox((self.names, 1), hbox(add, remove))
         self.fill(hbox((names, 1), (vbox(self.form, None), 1), spacing=16), self.problem)
+        self.names.setWordWrap(True)  # a name is never cut
         self.names.addItems([typed.name for typed in self._typed])
         self.names.currentRowChanged.connect(self._show)
         self.form.changed.connect(lambda _name, _value: self._keep())
@@ -75,8 +76,7 @@ class IndentersDialog(Dialog):
 
     def remove(self) -> None:
         """Remove the chosen object."""
-        row = self.names.currentRow()
-        if row >= 0:
+        if (row := self.names.currentRow()) >= 0:
             del self._typed[row]
             with QSignalBlocker(self.names):
                 self.names.takeItem(row)
@@ -179,7 +179,8 @@ class MeasurePage(QWidget):
 
     def export_actions(self) -> tuple[QAction, ...]:
         """Return what the File menu offers to export from this page."""
-        return (self.press_view.certify_action, self.results.export_action)
+        shown = self.tabs.currentWidget() is self.press_view
+        return (self.press_view.certificate_action(shown=shown), self.results.export_action)
 
     def _show_again(self) -> None:
         """Judge the values by other limits."""

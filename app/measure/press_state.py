@@ -129,8 +129,8 @@ def resolve_press(
     )
     if (result := answer.result) is not None:
         first = result.figures[0]
-        asked = "side" if result.tool.name == "cuboid" else first.label
-        state = replace(state, asked=asked[:1].upper() + asked[1:], unit=first.unit)
+        asked = first.label[:1].upper() + first.label[1:]
+        state = replace(state, asked=asked, unit=first.unit)
         if result.tool == tool:
             return _with_result(state, result, reference, quantities_of(result, reference, limits))
     if answer.refused:  # why an image cannot be measured is in the banner
@@ -246,7 +246,9 @@ def advice_of(
         text = "No calibration is in use. Depth cannot be measured without one."
         return Finding("sensors", text)
     if state.frozen and refused:
-        return Finding("live", refused, verdict=Verdict.FAIL)
+        other = advise(now)
+        fits = other is not None and other.key == "fitting"
+        return Finding("fitting" if fits else "live", refused, verdict=Verdict.FAIL)
     if state.earlier:
         text = "The image shows an earlier press. The sensor shows another one now."
         return Finding("live", text, verdict=Verdict.WARN)

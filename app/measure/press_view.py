@@ -8,6 +8,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
 from app.live.banner import AdviceBanner
@@ -20,6 +21,7 @@ from app.live.tool_layer import tool_handles
 from app.program.context import AppContext
 from app.program.file_dialogs import ask_open, ask_save
 from app.program.jobs import BackgroundJob, JobQueue
+from app.program.workspace import folder_name
 from app.source_ui.bench_panel import BenchArea
 from app.sources.source_list import next_image
 from app.views.map.colour_tables import colour_table
@@ -29,6 +31,7 @@ from app.widgets.label import plain_tip
 from app.widgets.layout import hbox, vbox
 from app.widgets.widget_names import set_names
 from gelpolight_core.base.errors import InputError, Remedy
+from gelpolight_core.geometry.membrane_shape import FLAT
 from gelpolight_core.image.image_file import SUFFIXES
 from gelpolight_core.lab.measurement_record import MeasurementRecord
 from gelpolight_core.measurement.result import MeasuredPress, Measurement
@@ -49,10 +52,11 @@ TOOLS_WIDTH = 148
 QUANTITIES = {"depth": "Depth", "residual": "Residual of the fitted object"}
 """What colours the surface in 3D."""
 CERTIFY_TIPS = (
-    "Measure a ball, cylinder or cuboid first. A record only names its image: double-click it",
+    "Measure a ball, cylinder or cuboid first",
     "Save the sizes with their uncertainty budget and decisions as PDF",
+    "Open the record's image first",
 )
-"""Of the certificate: why there is none, and what it is."""
+"""Of the certificate: why there is none, what it is, and why there is none beside the records."""
 
 
 class PressView(QWidget):
@@ -221,8 +225,7 @@ class PressView(QWidget):
         """Let the user choose an image or a recording."""
         endings = " ".join(f"*{ending}" for ending in (*SUFFIXES, RECORDING))
         title, patterns = "Open an image or a recording", f"Images and recordings ({endings})"
-        path = ask_open(self, self.context.settings, "press", title, patterns)
-        if path is not None:
+        if path := ask_open(self, self.context.settings, "press", title, patterns):
             self.try_file(path)
 
     def try_file(self, path: Path) -> None:
@@ -263,8 +266,9 @@ class PressView(QWidget):
         if self.work.image is not None and self.work.image.path is not None:
             self.stage.surface.set_pins(())  # they were on another source's image
         self._steady.hold(None)
-        self.replay.hold(None)
         self.work.take(None)
+        self._on_switched()
+        self.replay.hold(None)
         self._want()
         if self.live.stream is None or not self.map.map.has_image:
             self._say_what_comes()
@@ -280,6 +284,7 @@ class PressView(QWidget):
         bench = None if image.frame is None else self.context.source.virtual
         self.inspector.reference.new_press(None if bench is None else bench.scene.truth)
         self.work.take(image, propose=propose)
+        self._on_switched()
         self._want()
         if image.path is not None:
             self._say_what_comes()
@@ -363,22 +368,30 @@ class PressView(QWidget):
             file=image.path,
         )
 
+    def certificate_action(self, *, shown: bool) -> QAction:
+        """Return the action that writes the certificate of the measured object, if it is shown."""
+        can_certify = self._measurement is not None and shown
+        self.certify_action.setEnabled(can_certify)
+        self.certify_action.setToolTip(plain_tip(CERTIFY_TIPS[can_certify if shown else 2]))
+        return self.certify_action
+
     def choose_certificate(self) -> None:
         """Let the user choose the file of the certificate of the measured object."""
-        title, name = "Save the certificate", "measurement.pdf"
-        path = ask_save(self, self.context.settings, "report", title, name, "PDF (*.pdf)")
-        if path is not None:
+        assert self.work.image is not None, "the action is only for a measurement"
+        stem = folder_name(Path(self.work.image.name).stem)
+        title, name = "Save the certificate", f"{stem}-certificate.pdf"
+        if path := ask_save(self, self.context.settings, "report", title, name, "PDF (*.pdf)"):
             self.certify(path)
 
     def certify(self, path: Path) -> None:
-        """Write the certificate of the measured object. The panel shows how it ended."""
+        """Write the certificate of the measured object. A message says where it is."""
         image, heightmap, fit = self.work.image, self.work.heightmap, self._measurement
         if image is None or heightmap is None or fit is None or self._best is None:
             return
         calibration = self._best.calibration
         digest = "" if image.path is None else file_hash(image.path)
         truth = self.inspector.reference.stated_for(fit.shape)
-        press = MeasuredPress(image.name, digest, heightmap, fit, truth)
+        press = MeasuredPress(image.name, digest, heightmap, fit, truth, image.time)
         percent = self.context.settings.limits.percent
         operator = self.inspector.remarks.value.operator
         colours = colour_table(self.context.display.value.colours)
@@ -392,14 +405,10 @@ class PressView(QWidget):
             )
             write_report(report, path)
 
-        saved = f"Certificate saved as {path}"
-        self._jobs.submit(
-            BackgroundJob(
-                "Writing the certificate",
-                write,
-                lambda _: self.inspector.show_message(saved, "pass"),
-            )
-        )
+        def done(_nothing: None) -> None:
+            self.context.toasts.show(f"Certificate saved to {path}.", "pass")
+
+        self._jobs.submit(BackgroundJob("Writing the certificate", write, done, must=True))
 
     def _place(self, kind: str) -> None:
         """Let the user place a tool on the frozen image. Empty: none."""
@@ -430,8 +439,7 @@ class PressView(QWidget):
 
     def unfinished(self) -> str:
         """Return what would be lost if the window was closed. Empty: nothing."""
-        record = self._record()
-        unsaved = record is not None and not self._is_saved(record)
+        unsaved = self.save_action.isEnabled()
         return "A measurement is not saved to the records." if unsaved else ""
 
     def refresh(self) -> None:
@@ -458,8 +466,6 @@ class PressView(QWidget):
         self.save_action.setEnabled(record is not None and not saved)
         text = "Save the earlier press" if state.earlier else "Save to records"
         self.save_action.setText("Saved" if saved else text)
-        self.certify_action.setEnabled(self._measurement is not None)
-        self.certify_action.setToolTip(plain_tip(CERTIFY_TIPS[self._measurement is not None]))
         self.remove_action.setEnabled(bool(state.kind))
         if not state.frozen:
             self.palette_.clear()
@@ -469,14 +475,15 @@ class PressView(QWidget):
     def _show_work(self) -> None:
         """Show the frozen image, its tools and their section."""
         work, results = self.work, self.work.image_results
-        grips = () if work.tool is None else tool_handles(work.tool)
+        grips = () if work.tool is None or work.refused else tool_handles(work.tool)
         self.stage.show_tools(self.map.drawn(), grips, work.grip)
         self.section.show_work(work)
         before = self._frozen, self._measurement
         self._frozen = None if results is None else results.shown
         fit = self._measurement = None if work.result is None else work.result.measurement
         if fit is not before[1]:
-            self.stage.surface.show_solid(None if fit is None else partial(solid_of, fit))
+            at_rest = FLAT if work.heightmap is None else work.heightmap.at_rest
+            self.stage.surface.show_solid(None if fit is None else partial(solid_of, fit, at_rest))
         if self._frozen is not before[0] or (
             fit is not before[1] and self._colour_by == "residual"
         ):
@@ -512,7 +519,9 @@ class PressView(QWidget):
     # The calibration and the source
 
     def _on_switched(self) -> None:
-        self.replay.follow(self.live.source)
+        image = self.work.image
+        is_opened = image is not None and image.path is not None
+        self.replay.follow(None if is_opened else self.live.source)
         self.inspector.bench.setVisible(self._bench.follow())
 
     def _on_replayed(self) -> None:

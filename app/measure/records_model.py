@@ -96,7 +96,7 @@ class RecordsModel(QObject):
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements. This can be undone."""
         self._push(
-            f"remove {len(numbers)} measurements",
+            f"remove {len(numbers)} measurement{'s' * (len(numbers) > 1)}",
             lambda records: records.remove(*numbers),
             lambda records: records.restore(*numbers),
         )

@@ -198,8 +198,7 @@ class RecordsView(QWidget):
         """Let the user choose the file of the table."""
         settings, sign = self._context.settings, "comma" if has_decimal_comma() else "point"
         title, patterns = "Export as CSV", f"Tables with a decimal {sign} (*.csv)"
-        path = ask_save(self, settings, "table", title, "measurements.csv", patterns)
-        if path is not None:
+        if path := ask_save(self, settings, "table", title, "measurements.csv", patterns):
             self.export_to(path)
 
     def export_to(self, path: Path) -> None:
@@ -280,7 +279,7 @@ def _cells(quantity: Quantity, found: Statistics, errors: list[float]) -> tuple[
     cells = [f"{value:.4f}" if math.isfinite(value) else "-" for value in values]
     limit = too_few_repeats(found.missing) or f"{found.repeatability:.4f}"
     error = f"{sum(errors) / len(errors):+z.2f} %" if errors else "-"
-    return f"{quantity.label} ({quantity.unit})", [*cells, limit, error]
+    return f"{quantity.label} ({unit_behind(quantity.unit).strip()})", [*cells, limit, error]
 
 
 def _row(tag: str, label: str, cells: Sequence[str]) -> str:

@@ -187,7 +187,7 @@ class ToolMap(HeightPanel):
             text = (
                 f"{asks[len(self._points)]}. Return places the tool in the middle, Escape cancels."
             )
-        elif self._work.chosen:
+        elif self._work.chosen and not self._work.refused:
             text = "Drag the squares, or move them with the arrow keys."
         self.hint.setText(text)
 
@@ -199,7 +199,7 @@ class ToolMap(HeightPanel):
         self._report()
         return tuple(
             _drawn(key, tool, work.answer_of(key), chosen=key == work.chosen)
-            for key, tool in work.sheet.items()
+            for key, tool in ({} if work.refused else work.sheet).items()
         )
 
     def on_tool(self, key: int) -> None:

@@ -18,6 +18,7 @@ WALLED = ("cylinder", "cuboid")
 """Shapes with walls, which have an edge; they are steeper than a ball."""
 EXPANDED = "± U (k = 2)"
 """Label of an expanded uncertainty."""
+FACE_TO_BASE = "Height of the object from its face to its base, if it has one"
 RANGE_MM = (0.0, 1000.0)
 """Range of every length."""
 LENGTH_KEYS = tuple(
@@ -34,17 +35,9 @@ def _length(label: str, none: str, *, tip: str = "", when: When | None = None) -
 
 
 def _expanded(when: When | None = None) -> Any:
-    return number(
-        0.0,
-        EXPANDED,
-        *RANGE_MM,
-        decimals=4,
-        step=0.001,
-        none="not stated",
-        tip="Expanded uncertainty (k = 2) on the certificate of the reference",
-        beside=EXPANDED,
-        when=when,
-    )
+    tip = "Expanded uncertainty (k = 2) on the certificate of the reference"
+    how: dict[str, Any] = {"none": "not stated", "tip": tip, "beside": EXPANDED, "when": when}
+    return number(0.0, EXPANDED, *RANGE_MM, " mm", 4, step=0.001, **how)
 
 
 def _is_shape(stated: ReferenceObject) -> bool:
@@ -91,15 +84,8 @@ class ReferenceObject(_Named):
     size_mm: float = _length("Diameter or side", "not known")
     _: KW_ONLY
     size_expanded_mm: float = _expanded()
-    second_mm: float = _length(
-        "Other side", "the same", when=lambda stated: stated.shape == "cuboid"
-    )
-    height_mm: float = _length(
-        "Height",
-        "not known",
-        tip="Height of the object from its face to its base, if it has one",
-        when=_is_shape,
-    )
+    second_mm: float = _length("Other side", "the same", when=lambda one: one.shape == "cuboid")
+    height_mm: float = _length("Height", "not known", tip=FACE_TO_BASE, when=_is_shape)
     height_expanded_mm: float = _expanded(_is_shape)
     edge_radius_mm: float = _length("Edge radius", "fitted", when=_has_walls)
     edge_radius_expanded_mm: float = _expanded(_has_walls)

@@ -34,5 +34,8 @@ def test_a_press_is_requested_and_a_frozen_one_needs_no_advice():
     assert (noted.line, noted.verdict) == ("It is dim. Light it. It is cut off.", Verdict.WARN)
     refused = advised(ready, frozen=True, why="it is grey")
     assert (refused.text, action_of(refused)) == ("it is grey", "live")
+    other = CalibrationTarget("B-2", (1280, 960))
+    from_other = replace(ready, serial="B-2", calibrations=(USED, other))
+    assert action_of(advised(from_other, frozen=True, why="of another sensor")) == "fitting"
     earlier = advised(ready, frozen=True, earlier=True)
     assert (action_of(earlier), earlier.verdict) == ("live", Verdict.WARN)

@@ -20,6 +20,7 @@ from report_pdf import report_data
 from app.cli.main import main
 from app.live.tool_layer import tool_handles
 from app.measure.page import MeasurePage
+from app.measure.press_view import PressView
 from app.measure.record_table import TITLES
 from app.program.context import AppContext
 from app.program.preferences import WarningLimits, settings_file
@@ -122,7 +123,7 @@ def test_damaged_records_are_reported(context, qtbot):
 @pytest.mark.function("Detect, measure, compare and save a pressed object, as the command does")
 @pytest.mark.usefixtures("library")
 def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
-    page, context, qtbot, press, tmp_path, calibration_file
+    page, context, qtbot, press, tmp_path, calibration_file, monkeypatch
 ):
     _put_cylinder(page, press, qtbot)
     press_view = page.press_view
@@ -149,7 +150,13 @@ def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     assert (record.operator, record.note, record.picture) == ("Ada", "on the bench", press.name)
 
     certificate = tmp_path / "measurement.pdf"
-    assert press_view.certify_action in page.export_actions()
+    certify = press_view.certify_action
+    assert certify in page.export_actions() and certify.isEnabled()
+    page.tabs.setCurrentWidget(page.results)  # that of a record is made from its image
+    assert certify in page.export_actions() and not certify.isEnabled()
+    assert "image first" in certify.toolTip()
+    page.tabs.setCurrentWidget(press_view)
+    assert press.stem in _name_of(press_view, monkeypatch)
     press_view.certify(certificate)
     qtbot.waitUntil(certificate.exists, timeout=PATIENCE_MS)
     (certified,) = report_data(certificate)["data"]["measurements"]
@@ -250,7 +257,7 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
 
     # A double click measures on the image again, as long as it is there.
     page.press_view.release()
-    assert not page.press_view.certify_action.isEnabled()
+    assert not page.export_actions()[0].isEnabled()
     results.table.doubleClicked.emit(results.table.model().index(0, 0))
     assert page.tabs.currentWidget() is page.press_view
     assert page.press_view.work.image.path == press
@@ -263,6 +270,16 @@ def test_the_fit_uses_a_stated_edge_radius_and_records_are_removed_and_exported(
     results.table.doubleClicked.emit(results.table.model().index(0, 0))
     assert "gone.png" in results.message.text() and page.press_view.work.image is None
     toasts.clear()
+
+
+def _name_of(view: PressView, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return the file name that is offered for the certificate."""
+    asked = []
+    monkeypatch.setattr(
+        QFileDialog, "getSaveFileName", lambda *args: asked.append(args) or ("", "")
+    )
+    view.choose_certificate()
+    return str(asked[0])
 
 
 def _true(press: Path) -> dict[str, str]:
@@ -484,6 +501,8 @@ def test_a_recording_can_be_measured_frame_by_frame(
     # A frozen frame is not measured with another sensor's calibration.
     press_view.freeze()
     qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
+    press_view.work.add(DistanceTool((0.0, 0.0), (1.0, 0.0)))
+    assert press_view.map.layer.tools and press_view.map.hint.text()
     other = small_calibration.changed(sensor=replace(small_calibration.data.sensor, serial="B-2"))
     write_calibration(other, tmp_path / "other.gplcal")
     context.workspace.use(context.workspace.import_calibration(tmp_path / "other.gplcal"))
@@ -491,7 +510,14 @@ def test_a_recording_can_be_measured_frame_by_frame(
     qtbot.waitUntil(lambda: "sensor virtual-1" in press_view.work.refused, timeout=PATIENCE_MS)
     assert press_view.work.heightmap is None
     assert not press_view.map.map.has_image
+    assert press_view.map.layer.tools == () and press_view.map.hint.text() == ""
     press_view.release()
+
+    # An opened image is not of the recording, whose position is not shown meanwhile.
+    press_view.open_file(press)
+    assert not press_view.replay.isVisible()
+    press_view.release()
+    assert press_view.replay.isVisible()
     assert press_view.map.map._words.text() == "No depth yet."
 
 
