@@ -162,13 +162,8 @@ class SectionPanel(QWidget):
         self.form = Form(SectionSettings(), "inspect.section")
         self.form.changed.connect(lambda _name: on_changed())
         self._plot.level_dragged.connect(lambda depth_mm: self.form.change(level_mm=depth_mm))
-        save = push_button(
-            "inspect.section.save",
-            "Save…",
-            on_save,
-            accessible="Save the profile",
-            tip="Save the profile as a table (CSV)",
-        )
+        texts = {"accessible": "Save the profile", "tip": "Save the profile as a table (CSV)"}
+        save = push_button("inspect.section.save", "Save…", on_save, **texts)
         self._figures = set_names(MarkupLabel(wrap=True), "inspect.section.figures", "Measurements")
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         figures, settings = scroll_area(self._figures), QWidget()
@@ -199,11 +194,5 @@ class SectionPanel(QWidget):
             if ends is not None:
                 part.setRegion(ends)
         self._plot.show_width(cut.width_ends)
-        self._figures.setText(
-            "<br>".join(
-                [
-                    *(f"{escaped(f.label)}: <b>{escaped(f.text)}</b>" for f in cut.figures),
-                    *map(escaped, cut.sentences),
-                ]
-            )
-        )
+        lines = [f"{escaped(f.label)}: <b>{escaped(f.text)}</b>" for f in cut.figures]
+        self._figures.setText("<br>".join([*lines, *map(escaped, cut.sentences)]))

@@ -359,9 +359,11 @@ class _MapImages:
         if self._display.colour_by != "depth":
             rgb, scale = self._quantity()
             texture = np.asarray(cv2.multiply(rgb, self._light(), scale=1 / 255.0), np.uint8)
+        # The surface ends between pixels, so its rim needs colours a little farther out.
+        beyond = np.asarray(cv2.erode(self._outside, np.ones((5, 5), np.uint8)), np.uint8)
         return surface_of(
             self._map,
-            texture,
+            shading.fill_outside(texture.copy(), beyond),
             scale,
             range_mm=self.range_mm,
             largest=None if still else LIVE_NODES,

@@ -24,8 +24,8 @@ class ColourRange:
     """The automatic range of the colours over a sequence of depth maps.
 
     Each end is 0, or 1, 2, 5 times a power of ten times `HEADROOM`. It grows as soon as the depth
-    goes beyond its limit. It shrinks after the depth was small for `SHRINK_AFTER_S` of a press. Without
-    a press it stays, so that the next press has the colours of the last one.
+    goes beyond its limit. It shrinks after the depth was small for `SHRINK_AFTER_S` of a press.
+    Without a press it stays, so that the next press has the colours of the last one.
     """
 
     def __init__(self) -> None:

@@ -174,9 +174,9 @@ class DisplaySurface:
     curved: bool
 
     @property
-    def axis(self) -> str:
-        """Title of the depth axis."""
-        return "\N{MINUS SIGN}height (mm)" if self.curved else "depth (mm)"
+    def axis(self) -> tuple[float, str]:
+        """Value of a depth of 1 on the upright axis, and the title of this axis."""
+        return (-1.0, "height (mm)") if self.curved else (1.0, "depth (mm)")
 
     def thinned(self, largest: int) -> DisplaySurface:
         """Return it with at most this many nodes per side. The texture keeps its detail."""

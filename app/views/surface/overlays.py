@@ -52,6 +52,10 @@ SOLID = "#5fd0ff"
 QUIET: dict[str, Any] = {"reset_camera": False, "render": False}
 """Added to the scene without moving the camera or drawing at once."""
 PLAIN = {**QUIET, "lighting": False}
+PLATE = 0.7
+"""Opacity of the plates behind letters."""
+BAR = 0.135
+"""Share of the view, from the left, in which the colour bar lies: the axes begin beside it."""
 LIFT = 0.001
 """Lines lie above the surface by this share of its width, so that it does not cover them."""
 
@@ -177,7 +181,7 @@ def draw_axes(plotter: Plotter, marks: AxesMarks | None, ink: SceneColours) -> N
         _label(plotter, "axes-labels", points, texts, ink.font + 1, **how)
 
 
-def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project) -> AxesMarks:
+def axes_marks(box: Box, scale: float, title: str, project: Project) -> AxesMarks:
     """Return the lines of the axes with their ticks, and the places and texts of the labels.
 
     The values are true: the sensor's y, and depth that is not exaggerated. Their steps follow from
@@ -188,10 +192,10 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project
     ----------
     box : Box
         Its edges are the axes.
-    exaggeration : float
-        Factor on the depth.
-    depth_title : str
-        Title of the axis of the depth.
+    scale : float
+        Value of a place of 1 on the upright axis.
+    title : str
+        Its title.
     project : callable
         Returns where points (N, 3) of the scene are seen (N, 2), in sizes of a letter.
     """
@@ -202,22 +206,21 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project
     levels = project(foot)[:, 1].round(2).reshape(2, 2)
     back, aside = (int(levels.sum(axis=k).argmin()) for k in (1, 0))
     out_x, out_y, down = np.array([2 * aside - 1, 2 * back - 1, -1])[:, None] * np.eye(3)
-    scale = 1.0 / exaggeration
     # Start and vector of each axis, sides for its labels, value of a place of 1, title.
     axes = (
         (foot[2 * back], width, np.array([out_y, down]), 1.0, "x (mm)"),
         (foot[aside], depth, np.array([out_x, down]), -1.0, "y (mm)"),
-        (foot[2 * back + 1 - aside], height, np.array([-out_x, out_y]), scale, depth_title),
+        (foot[2 * back + 1 - aside], height, np.array([-out_x, out_y]), scale, title),
     )
     ends = np.concatenate([[start, start + axis] for start, axis, *_ in axes])
     ticks, points, texts = [ends], list[Float64Array](), list[str]()
     seen = np.diff(project(ends).reshape(3, 2, 2), axis=1)[:, 0]
     lengths = np.maximum(np.hypot(*seen.T), 1e-9)  # 0 end-on
-    for number, (start, axis, sides, value, title) in enumerate(axes):
-        along, named = seen[number], np.array([LETTER * len(title), NUMBER[1]])
+    for number, (start, axis, sides, value, name) in enumerate(axes):
+        along, named = seen[number], np.array([LETTER * len(name), NUMBER[1]])
         across, longer = along[::-1] * (-1.0, 1.0) / lengths[number], lengths > lengths[number]
         lowest, highest = sorted(value * ends[2 * number : 2 * number + 2, number])
-        with np.errstate(divide="ignore"):  # upright or level
+        with np.errstate(divide="ignore", over="ignore"):  # upright or level
             apart, above = np.min([NUMBER, 0.5 * (NUMBER + named)] / np.abs(along), axis=1)
         step = round_up(apart * (highest - lowest))
         away = lengths[number] * np.abs(seen @ across)[longer] / lengths[longer]
@@ -234,7 +237,7 @@ def axes_marks(box: Box, exaggeration: float, depth_title: str, project: Project
         beside = middle + (2.5 * tall + taller) * out
         titled = start + (1.0 + above) * axis if number == 2 else beside  # it may be short
         points += [*(at + 1.5 * tall * out), titled]
-        texts += [*(f"{amount + 0.0:.4g}" for amount in amounts), title]
+        texts += [*(f"{amount + 0.0:.4g}" for amount in amounts), name]
     return np.concatenate(ticks), np.array(points).reshape(-1, 3), texts
 
 
@@ -258,11 +261,11 @@ def draw_scale(
     mapper.scalar_visibility = False  # the texture contains the colours
     title = scale.title.replace(" (", "\n(")  # the unit on a line of its own, for narrow views
     numbers = {"n_labels": 0 if scale.names else 5, "fmt": "{:.4g}"}
-    place = {"position_x": 0.015, "position_y": 0.55, "width": 0.14, "height": 0.42}
+    place = {"position_x": 0.015, "position_y": 0.56, "width": BAR - 0.015, "height": 0.38}
     sizes = {"title_font_size": ink.font + 1, "label_font_size": ink.font + 1}
     how = {"vertical": True, "color": ink.text, "unconstrained_font_size": True, "render": False}
     bar = plotter.add_scalar_bar(title, mapper=mapper, **numbers, **place, **sizes, **how)
-    bar.SetBarRatio(0.2)
+    bar.SetBarRatio(0.25)
     bar.SetDrawAnnotations(bool(scale.names))
     if scale.names:
         bar.SetTextPositionToPrecedeScalarBar()  # puts the names on the other side
@@ -272,6 +275,7 @@ def draw_scale(
     for letters in (names, bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
         letters.SetFontFamily(VTK_FONT_FILE)
         letters.SetFontFile(FONT)
+        _back(letters, ink)
 
 
 def draw_note(plotter: Plotter, style: DisplaySettings, ink: SceneColours, *, curved: bool) -> None:
@@ -307,6 +311,13 @@ def _write(plotter: Plotter, name: str, text: str, place: str, ink: SceneColours
     how = {"position": place, "color": ink.text, "font_file": FONT}
     actor = plotter.add_text(text, name=name, render=False, **how)
     actor.SetMaximumFontSize(ink.font + 1)  # else the letters grow with the window
+    _back(actor.GetTextProperty(), ink)
+
+
+def _back(letters: Any, ink: SceneColours) -> None:
+    """Put a plate behind letters, whose colour could not be read over the surface."""
+    letters.SetBackgroundColor(pv.Color(ink.high).float_rgb)
+    letters.SetBackgroundOpacity(PLATE)
 
 
 def _label(plotter: Plotter, name: str, at: Any, texts: list[str], size: int, **how: Any) -> None:

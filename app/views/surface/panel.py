@@ -52,7 +52,7 @@ class SurfacePanel(QWidget):
     report : callable
         Called with the result of saving: a sentence and its kind.
     flat : callable
-        Makes the shaded map: a widget with `set_image`, `show_cursor` and the signal `pointed`.
+        Makes the shaded map: a widget with `set_image`, `show_message`, `show_cursor` and the signal `pointed`.
 
     Attributes
     ----------
@@ -172,6 +172,7 @@ class SurfacePanel(QWidget):
     def _show_flat(self, surface: DisplaySurface) -> None:
         if self._flat is None:
             self._flat = self._make_flat()
+            self._flat.show_message("")  # hides the colour bar, which has no range
             self._flat.pointed.connect(self.pointed)
             self._stack.addWidget(self._flat)
         self._flat.set_image(surface.texture, surface.extent_mm)

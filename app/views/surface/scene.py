@@ -18,6 +18,7 @@ from gelpolight_core.base.arrays import Float64Array, PointXY, Rgb8Array
 
 from .display_surface import LIVE_NODES, DisplaySurface, SurfaceLine
 from .overlays import (
+    BAR,
     CURSOR,
     CUT,
     VIEWS,
@@ -155,7 +156,8 @@ class Scene:
         if self.surface is None or not (self.box and self.style.axes):
             return None
         letter_px = (self._ink.font + 1) * self._plotter.render_window.GetDPI() / 72.0
-        letters, how = 0.5 * self._size / letter_px, (self.style.exaggeration, self.surface.axis)
+        letters, (value, title) = 0.5 * self._size / letter_px, self.surface.axis
+        how = value / self.style.exaggeration, title
         return axes_marks(self.box, *how, lambda points: letters * self._project(points))
 
     # Overlays on the surface
@@ -227,12 +229,14 @@ class Scene:
         rims = np.column_stack([ends, -np.repeat(surface.y_mm, 2)]).astype(np.float64)
         points = np.vstack([np.insert(rims, 2, depth, axis=1) for depth in self.box[4:]])
         self._plotter.renderer.reset_camera(render=False, bounds=self.box)
-        filled = np.clip(1.0 - 2.0 * MARGIN_PX / self._size, 0.4, 0.95)
+        taken = np.array([BAR * self.style.colour_bar, 0.0])
+        self._plotter.camera.SetWindowCenter(*-taken)
+        filled = np.clip(1.0 - taken - 2.0 * MARGIN_PX / self._size, 0.4, 0.95)
         # VTK fits a sphere around the box. The rim of the surface fits closer; as moving and
         # zooming change the perspective, twice.
         for _ in range(2):
             low, high = self._seen(points)
-            self._pan(0.5 * (low + high))
+            self._pan(0.5 * (low + high) - taken)
             low, high = self._seen(points)
             self.zoom(float(min(filled / (0.5 * (high - low)))))
 

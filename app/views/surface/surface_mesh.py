@@ -51,9 +51,6 @@ class SurfaceActor:
             pv.Plane(), texture=self._texture, color="white", name="surface", **how
         )
         self.actor.visibility = False
-        # The grid on the floor of the axes box is at depth 0, like the membrane.
-        self.actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        self.actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2.0, -2.0)
 
     def show(self, surface: DisplaySurface) -> None:
         """Show a surface with all its nodes."""

@@ -169,3 +169,9 @@ def test_a_stored_image_that_is_shown_by_itself_has_its_own_colour_range(dome, f
         reconstruction.heightmap = deeper
         ranges.append(processor(replace(frame, paused=paused)).range_mm[1])
     assert ranges == pytest.approx([2.4, 2.4, 1.2, 2.4])
+
+
+def test_the_shaded_map_is_dark_where_nothing_is_measured(dome, frame):
+    for still in (False, True):
+        shown, _ = _made(dome, frame, surface=True, still=still)
+        assert tuple(shown.surface.texture[0, 0]) == SURROUND

@@ -42,4 +42,4 @@ def test_a_curved_membrane_is_shown_itself(heightmap):
     assert found.depth_at(places[:, 0], places[:, 1]) == pytest.approx(expected, abs=0.02)
     assert found.range_mm[0] == pytest.approx(-2.0, abs=0.01)
     assert found.range_mm[0] <= found.depth_mm.min()
-    assert found.curved and "height" in found.axis
+    assert found.curved and found.axis == (-1.0, "height (mm)")

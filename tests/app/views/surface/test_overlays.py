@@ -31,7 +31,7 @@ def _axes(texts, points):
 @given(st.floats(-180.0, 180.0), st.floats(0.0, 90.0), st.floats(0.2, 5.0))
 def test_numbers_of_an_axis_are_round_even_and_never_cover_each_other(azimuth, elevation, scale):
     project = _project(azimuth, elevation, scale)
-    _, points, texts = axes_marks(BOX, 3.0, "depth (mm)", project)
+    _, points, texts = axes_marks(BOX, 1.0 / 3.0, "depth (mm)", project)
     for values, places in _axes(texts, points).values():
         steps = np.diff(values)
         assert len(values) and np.allclose(steps, steps[:1].repeat(len(steps)))
@@ -44,7 +44,7 @@ def test_a_longer_axis_has_more_numbers_and_one_seen_end_on_has_none():
     small, large, flat = (
         _axes(texts, points)
         for direction in ((30.0, 40.0, 0.5), (30.0, 40.0, 4.0), (0.0, 0.0, 2.0))
-        for _, points, texts in [axes_marks(BOX, 3.0, "depth (mm)", _project(*direction))]
+        for _, points, texts in [axes_marks(BOX, 1.0 / 3.0, "depth (mm)", _project(*direction))]
     )
     assert len(large["x (mm)"][0]) > 2 * len(small["x (mm)"][0])
     assert set(large) == {"x (mm)", "y (mm)", "depth (mm)"} and "y (mm)" not in flat
@@ -53,6 +53,6 @@ def test_a_longer_axis_has_more_numbers_and_one_seen_end_on_has_none():
 def test_x_and_y_lie_along_the_lower_edges_of_the_view():
     for azimuth in (20.0, 110.0, 200.0, 290.0):
         project = _project(azimuth, 40.0, 2.0)
-        ends, _, _ = axes_marks(BOX, 3.0, "depth (mm)", project)
+        ends, _, _ = axes_marks(BOX, 1.0 / 3.0, "depth (mm)", project)
         middle = project(np.zeros((1, 3)))[0, 1]
         assert (project(ends[:4]).reshape(2, 2, 2).mean(axis=1)[:, 1] < middle).all()

@@ -16,9 +16,11 @@ from shiboken6 import getAllValidWrappers
 from app.program.display import DisplayStore
 from app.program.jobs import JobQueue
 from app.views.map.colour_tables import colour_table
-from app.views.surface.overlays import FONT, VIEWS
+from app.views.surface.display_surface import SurfaceLine, surface_of
+from app.views.surface.overlays import BAR, FONT, VIEWS
 from app.views.surface.panel import SurfacePanel
 from app.widgets.layout import hbox
+from gelpolight_core.geometry.membrane_shape import MembraneShape
 from tests.app.views.surface.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
 
 PLAIN = {"axes": False, "colour_bar": False, "orientation": False}
@@ -140,6 +142,34 @@ def test_a_curved_membrane_is_not_stretched_and_all_axes_are_in_the_window(panel
     assert (low > -1.0).all() and (high < 1.0).all()
     panel.show_surface(made())
     assert scene.style.exaggeration == 5.0 and scene.box[5] == pytest.approx(5.0)
+
+
+def test_a_line_is_drawn_whole_on_a_curved_membrane(panel, made, heightmap, qtbot):
+    panel.display.change(**PLAIN)
+    curved = replace(heightmap, at_rest=MembraneShape("spherical_cap", 2.0, 18.0))
+    surface = made()
+    panel.show_surface(
+        surface_of(curved, surface.texture, surface.scale, range_mm=(0.0, 1.0), largest=128)
+    )
+    panel.show_lines((SurfaceLine(((-7.0, 0.0), (7.0, 0.0)), "#ff0000"),))
+    for view in ("isometric", "top"):
+        panel.view_from(view)
+        image = _drawn(panel, qtbot)
+        red = (np.abs(image - (255, 0, 0)).max(axis=2) < 40).any(axis=0)
+        columns = np.flatnonzero(red)
+        assert red[columns[0] : columns[-1] + 1].mean() > 0.97 and columns.size > 200
+
+
+def test_the_surface_and_its_axes_lie_beside_the_colour_bar(panel):
+    scene = panel.view.scene  # type: ignore[union-attr]
+    for view in VIEWS:
+        panel.view_from(view)
+        low, high = scene._seen(scene._marks()[0])  # type: ignore[index]
+        assert -1.0 + 2.0 * BAR < low[0] and high[0] < 1.0
+    panel.display.change(colour_bar=False)
+    panel.view_from("top")
+    low, high = scene._seen(scene._marks()[0])  # type: ignore[index]
+    assert low[0] == pytest.approx(-high[0], abs=0.05)
 
 
 @pytest.mark.function("Exaggerate the depth while the axes stay true")
