@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt, Signal
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from app.widgets import theme
@@ -17,6 +17,7 @@ from gelpolight_core.output.report.result_pictures import (
     DIVERGING,
     LED_ROLES,
     MOST_NAMES,
+    TEXT_SHARE,
     Bars,
     Field,
     Label,
@@ -30,7 +31,7 @@ from gelpolight_core.output.report.result_pictures import (
 SMALL = 0.8
 """Size of the letters in a picture, over the usual one."""
 LEAST_HEIGHTS = {True: 150, False: 100}
-"""Of pictures from above, and of charts."""
+"""Of pictures from above, and of charts. Their text has its own height."""
 
 
 class ResultPlot(QFrame):
@@ -60,16 +61,19 @@ class ResultPlot(QFrame):
         set_names(self.plot, f"result.picture.{picture.key}", picture.title)
         # As high as there is room.
         self.plot.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        self.plot.setMinimumHeight(LEAST_HEIGHTS[self.from_above])
+        self.plot.viewport().installEventFilter(self)
         self.plot.setMouseEnabled(False, False)
+        self.plot.getPlotItem().setContentsMargins(0.0, 6.0, 0.0, 0.0)  # the highest number
         self.plot.setLabels(**dict(zip(("bottom", "left"), picture.labels, strict=True)))
         if self.from_above:
             self.plot.setAspectLocked(True)
             self.plot.invertY(True)
         self.plot.scene().sigMouseClicked.connect(self._click)
-        beside = hbox((self.plot, 3), (caption, 1, Qt.AlignmentFlag.AlignTop), spacing=12)
-        parts = (caption, (self.plot, 1)) if self.from_above else ((beside, 1),)
-        vbox(title, *parts, of=self, margins=(12, 8, 12, 8), spacing=4)
+        beside = () if self.from_above else ((caption, 1, Qt.AlignmentFlag.AlignTop),)
+        row = hbox((self.plot, 3), *beside, spacing=12)
+        row.addStrut(LEAST_HEIGHTS[self.from_above])
+        parts = (title, caption) if self.from_above else (title,)
+        vbox(*parts, (row, 1), of=self, margins=(12, 8, 12, 8), spacing=4)
         self._draw()
 
     def changeEvent(self, event: QEvent) -> None:
@@ -77,6 +81,12 @@ class ResultPlot(QFrame):
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "plot"):
             self._draw()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Leave the wheel to the page."""
+        is_wheel = event.type() == QEvent.Type.Wheel
+        event.setAccepted(event.isAccepted() and not is_wheel)
+        return is_wheel or super().eventFilter(watched, event)
 
     def bar_at(self, x: float) -> str:
         """Return the name of the bar at a place along the axis, empty beside all bars."""
@@ -93,14 +103,14 @@ class ResultPlot(QFrame):
         self.plot.clear()
         apply_theme(self.plot)
         self.plot.setBackground(theme.colour("alternate"))
-        for mark in self.picture.marks:
+        # A text lies on no line.
+        marks = sorted(self.picture.marks, key=lambda mark: isinstance(mark, Label | Level))
+        for mark in marks:
             self._add(mark)
         self.plot.autoRange(padding=0.08)
         if not self.from_above:
-            tops = [
-                np.max(m.y, initial=0.0) for m in self.picture.marks if not isinstance(m, Field)
-            ]
-            self.plot.setYRange(0.0, 1.3 * max(tops), padding=0.0)
+            tops = [np.max(m.y, initial=0.0) for m in marks if not isinstance(m, Field)]
+            self.plot.setYRange(0.0, max(tops) / (1.0 - TEXT_SHARE), padding=0.0)
 
     def _add(self, mark: Mark) -> None:
         match mark:
@@ -116,17 +126,17 @@ class ResultPlot(QFrame):
             case Line(x, y, role):
                 self.plot.plot(x, y, pen=pg.mkPen(_colour(role), width=2 - self.from_above))
             case Label(x, y, text, role, above_end):
-                item = pg.TextItem(text, _colour(role), anchor=(1, 1) if above_end else (0.5, 0.5))
+                anchor, fill = (1, 1) if above_end else (0.5, 0.5), theme.colour("alternate")
+                item = pg.TextItem(text, _colour(role), anchor=anchor, fill=fill)
+                item.textItem.document().setDocumentMargin(0.0)
                 item.textItem.setScale(SMALL)
                 item.setPos(x, y)
                 self.plot.addItem(item)
-            case Level(value, text):
-                pen = pg.mkPen(_colour("warn"), style=Qt.PenStyle.DashLine)
-                opts = {"position": 0.5, "anchors": [(0.5, 1)] * 2, "color": _colour("warn")}
+            case Level(value, text, role, place):
+                pen = pg.mkPen(_colour(role), style=Qt.PenStyle.DashLine)
+                opts = {"position": place, "anchors": [(place, 1)] * 2, "color": _colour(role)}
                 opts["fill"] = theme.colour("alternate")
-                self.plot.addItem(
-                    pg.InfiniteLine(value, angle=0, pen=pen, label=text, labelOpts=opts)
-                )
+                self.plot.addItem(pg.InfiniteLine(value, 0, pen, label=text, labelOpts=opts))
             case Field(values, (left, right, top, bottom), reach):
                 image = pg.ImageItem(values, axisOrder="row-major", levels=(-reach, reach))
                 colours = pg.ColorMap(None, DIVERGING)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QTabWidget, QVBoxLayout, QWidget
@@ -128,6 +128,8 @@ MAIN = ("ball_height_error_percent", "held_out_normal_deg")
 
 Drawn = tuple[tuple["ResultPicture", ...], tuple[TermFact, ...], str]
 """Pictures as in the report, terms, and the sensor's last calibration beside this one, if any."""
+NOTHING: Drawn = (), (), ""
+FOLLOW = "follow when all stages have results."
 
 
 def drawn_result(project: CalibrationProject, workspace: Workspace) -> Drawn:
@@ -135,26 +137,28 @@ def drawn_result(project: CalibrationProject, workspace: Workspace) -> Drawn:
     from gelpolight_core.output.report.result_pictures import result_pictures  # slow to import
 
     run = project.finish()
-    c, joint, earlier = run.calibration, run.results.get(JOINT), ""
-    for entry in workspace.entries():
-        summary = entry.summary
-        if summary is None or entry.serial != c.serial or summary.inputs == c.provenance.inputs:
-            continue
-        figure, made = main_figure(summary.quality.values()), entry.created
-        if figure is not None and made is not None:
-            changes = ", ".join(changes_since(read_calibration(entry.path), c))
-            earlier = f"{made.astimezone():%-d %b}: {figure.value_text}, {changes}"
-            break
+    c, joint = run.calibration, run.results.get(JOINT)
     terms = () if joint is None else term_facts(joint.full)
-    return result_pictures(c, run), terms, earlier
+    return result_pictures(c, run), terms, last_calibration(c, workspace)
+
+
+def last_calibration(c: Calibration, workspace: Workspace) -> str:
+    """Return date and error of the sensor's last usable calibration, and what has changed since."""
+    entries = (e for e in workspace.entries() if e.serial == c.serial and not e.failed)
+    for summary, made, path in ((e.summary, e.created, e.path) for e in entries):
+        if summary is not None and made is not None and summary.inputs != c.provenance.inputs:
+            changes = ", ".join(changes_since(read_calibration(path), c))
+            return f"Last calibration, {made.astimezone():%-d %b}: {changes}."
+    return ""
 
 
 def changes_since(last: Calibration, c: Calibration) -> Iterator[str]:
-    """Yield how far the LEDs and the light of the untouched membrane are from the last ones."""
+    """Yield the error of the last calibration, and how far LEDs and light of the membrane are."""
+    if (figure := main_figure(last.quality.values())) is not None:
+        yield figure.value_text
     if isinstance(last.data, OpenSensor) and isinstance(c.data, OpenSensor):
         before_mm, now_mm = ((d.full or d).led_positions_mm for d in (last.data, c.data))
-        far_um = 1e3 * float(np.linalg.norm(now_mm - before_mm, axis=1).max())
-        yield f"LEDs within {far_um:.2g} \N{MICRO SIGN}m"
+        yield f"LEDs within {np.linalg.norm(now_mm - before_mm, axis=1).max():.3f} mm"
     before, now = (float(np.nanmedian(x.data.background)) for x in (last, c))
     yield f"light {100.0 * (now / before - 1.0):+.1f} %"
 
@@ -163,14 +167,11 @@ def terms_markup(facts: Iterable[TermFact]) -> str:
     """Return the terms that the sensor's light needs, and those left out, with their worth."""
     rows = {True: "", False: ""}
     for fact in facts:
+        values = f"<tr><td colspan='2' style='color: @muted'>{escaped(fact.values)}</td></tr>"
         rows[bool(fact.values)] += (
-            f"<tr><td width='97%'>{escaped(fact.name)}</td><td width='1%' align='right'"
-            f" style='white-space: nowrap'>{escaped(fact.worth)}</td></tr>"
+            f"<tr><td width='97%'>{escaped(fact.name)}</td><td width='1%' align='right' style="
+            f"'white-space: nowrap'>{escaped(fact.worth)}</td></tr>{values if fact.values else ''}"
         )
-        if fact.values:
-            rows[True] += (
-                f"<tr><td colspan='2' style='color: @muted'>{escaped(fact.values)}</td></tr>"
-            )
     markup = "".join(
         f"<h4>{title}</h4><table width='100%' cellspacing='2'>{rows[is_needed]}</table>"
         for title, is_needed in (("What this sensor needs", True), ("Left out", False))
@@ -185,11 +186,18 @@ def main_figure(tables: Iterable[QualityTable]) -> Finding | None:
 
 
 class VerdictOverview(QWidget):
-    """The verdict in one line, the poor figures first, and the others folded."""
+    """The verdict in one line, the poor figures first, and the others folded.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    on_press : callable
+        Called with the name of the press whose bar was clicked.
+    """
+
+    def __init__(self, on_press: Callable[[str], object]) -> None:
         super().__init__()
         set_names(self, "result", "Result")
+        self._on_press = on_press
         self.headline = named_label("result.headline", "Verdict", bold=1.5)
         self.poor = QualityTableWidget("result.poor", "Figures beyond their limits")
         self.every = set_names(MarkupLabel(wrap=True), "result.every", "All figures")
@@ -198,39 +206,35 @@ class VerdictOverview(QWidget):
         self.more.toggled.connect(self.every.setVisible)
         self.every.hide()
         self.plots: tuple[ResultPlot, ...] = ()
+        self.about = named_label("result.about", "About the pictures", role="muted")
         self._charts, self._maps, inside = QVBoxLayout(), QHBoxLayout(), QWidget()
-        parts = self.poor, self.every, (self._charts, 4), (self._maps, 3)
+        parts = self.about, self.poor, self.every, (self._charts, 4), (self._maps, 3)
         vbox(*parts, of=inside, margins=0, spacing=12)
         scroll = set_names(scroll_area(inside), "result.scroll", "Figures")
         head = hbox((self.headline, 1), self.more)
         vbox(head, (scroll, 1), of=self, margins=16, spacing=12)
 
-    def show_pictures(
-        self, pictures: Iterable[ResultPicture], chosen: Callable[[str], object]
-    ) -> None:
+    def show_pictures(self, pictures: Iterable[ResultPicture], about: str) -> None:
         """Show these pictures in place of the last ones: charts, and below them plans in a row."""
+        self.about.setText(about)
+        self.about.setVisible(bool(about))
         for plot in self.plots:
             plot.deleteLater()
         self.plots = tuple(map(ResultPlot, pictures))
         for plot in self.plots:
-            plot.chosen.connect(chosen)
+            plot.chosen.connect(self._on_press)
             (self._maps if plot.from_above else self._charts).addWidget(plot)
 
     def show_figures(self, tables: Sequence[tuple[str, QualityTable]], cause: str) -> None:
         """Show the figures of stages by their titles, the poor ones first, `cause` only once."""
         figures = join_quality_tables(table for _, table in tables).figures
-        severity, unsorted = list(Verdict), (f for f in figures if f.verdict is not Verdict.PASS)
-        poor = sorted(unsorted, key=lambda f: -severity.index(f.verdict))
+        poor = [f for f in figures if f.verdict is not Verdict.PASS]
+        poor.sort(key=lambda f: -list(Verdict).index(f.verdict))
         poor_figures = (replace(f, remedy="") if f.remedy == cause else f for f in poor)
         self.poor.set_table(QualityTable(tuple(poor_figures)))
         self.poor.setVisible(bool(poor))
-        self.every.setText(
-            "".join(
-                f"<h4>{escaped(title)}</h4>{QualityTableWidget.markup(table)}"
-                for title, table in tables
-                if table.figures
-            )
-        )
+        full = ((f"<h4>{escaped(title)}</h4>", table) for title, table in tables if table.figures)
+        self.every.setText("".join(head + QualityTableWidget.markup(t) for head, t in full))
         self.more.setText(f"All {len(figures)} figures")
         self.more.setVisible(bool(figures))
 
@@ -244,16 +248,15 @@ class ResultStep(Step):
 
     def build(self) -> None:
         """Create what only this step shows."""
-        self._drawn, self._earlier = cast(object, None), ""
-        self.overview = VerdictOverview()
+        self._drawn: object = self  # not the results of a stage
+        self.overview = VerdictOverview(self._open_press)
         self.terms = set_names(MarkupLabel(wrap=True), "result.terms", "Terms of the light")
         self.save = push_button("result.save", "&Save the calibration", self.store)
         self.report = push_button("result.report", "Write the &report…", partial(ask_report, self))
         self.saved = named_label("result.saved", "Where it was saved", role="pass")
-        foot = self.saved, self.report, self.save
-        self.own = tuple(map(self.panel.add_foot, foot))
+        self.own = tuple(map(self.panel.add_foot, (self.saved, self.report, self.save)))
         if JOINT.key in self.model.statuses:
-            self.own += (self.panel.add_extra("Terms of the light model", self.terms),)
+            self.own += (self.panel.add_extra("Terms of the light model", self.terms, below=True),)
         self.tabs = set_names(QTabWidget(documentMode=True), "result.tabs", "Result")
         self.tabs.addTab(self.overview, "Verdict")
         if REFLECTANCE.key in self.model.statuses:
@@ -296,10 +299,6 @@ class ResultStep(Step):
     def number(self) -> Finding | None:
         """Return the figure of the whole calibration."""
         return main_figure(status.quality for status in self.model.statuses.values())
-
-    def progress_line(self) -> str:
-        """Return the last calibration of the sensor."""
-        return self._earlier
 
     def remedies(self, state: str) -> tuple[RemedyButton, ...]:
         """Return buttons that correct the one cause: enter the number, or go to the step."""
@@ -345,33 +344,34 @@ class ResultStep(Step):
         verdict, role = self._verdict(statuses)
         self.overview.headline.setText(verdict)
         set_text_role(self.overview.headline, role)
-        is_complete = all(map(_is_made, statuses.values()))
-        has_failed = any(status.state is FAIL for status in statuses.values())
         is_idle = all(state != RUNNING for state, _ in model.page.states.values())
-        if is_complete and is_idle and not has_failed:
-            self._draw_result()
-        self.save.setText("&Save as a draft" if has_failed else "&Save the calibration")
-        self.save.setEnabled(is_complete and is_idle)
-        set_property(self.save, "primary", is_complete and not model.saved)
+        is_ready = is_idle and all(map(_is_made, statuses.values()))
+        self._draw_result(self.results.get(self.project.recipe.stages[-1]) if is_ready else None)
+        self.save.setText("&Save as a draft" if role == "fail" else "&Save the calibration")
+        self.save.setEnabled(is_ready and not model.saved)
+        self.save.setToolTip("It is saved, and nothing has changed since." if model.saved else "")
+        set_property(self.save, "primary", self.save.isEnabled())
         # The report waits for the stages by itself.
-        self.report.setEnabled(self.save.isEnabled() or bool(model.jobs.busy and model.saved))
+        self.report.setEnabled(is_ready or bool(model.jobs.busy and model.saved))
         self._show_tab()
 
-    def _draw_result(self) -> None:
-        """Draw the pictures of new results, in the background."""
-        last = self.results.get(self.project.recipe.stages[-1])
+    def _draw_result(self, last: object) -> None:
+        """Draw the pictures of new results of the last stage in the background, None: of none."""
         if last is self._drawn:
             return
         self._drawn = last
-        work = partial(drawn_result, self.project, self.context.workspace)
-        job = BackgroundJob("Drawing", lambda _progress: work(), self._show_result)
-        self.model.short_jobs.submit(job)
+        self._show_result(last, NOTHING)
+        if last is not None:
+            work = partial(drawn_result, self.project, self.context.workspace)
+            done = partial(self._show_result, last)
+            self.model.short_jobs.submit(BackgroundJob("Drawing", lambda _progress: work(), done))
 
-    def _show_result(self, drawn: Drawn) -> None:
-        pictures, terms, self._earlier = drawn
-        self.overview.show_pictures(pictures, self._open_press)
-        self.terms.setText(terms_markup(terms))
-        self.model.update_page(below=self.progress_line())
+    def _show_result(self, last: object, drawn: Drawn) -> None:
+        """Show what was drawn of these results, unless they have changed since."""
+        if last is self._drawn:
+            pictures, terms, earlier = drawn
+            self.overview.show_pictures(pictures, earlier if pictures else f"Pictures {FOLLOW}")
+            self.terms.setText(terms_markup(terms) if terms else f"They {FOLLOW}")
 
     def _open_press(self, stem: str) -> None:
         """Show the ball press of this name in its step."""
@@ -406,7 +406,8 @@ class ResultStep(Step):
             figures = join_quality_tables(status.quality for status in statuses.values()).figures
             if warnings := sum(figure.verdict is Verdict.WARN for figure in figures):
                 return f"Usable. Figures with a warning: {warnings}", "warn"
-            return f"Passed: all {len(figures)} figures are within their limits.", "pass"
+            count = sum(bool(figure.limit_text) for figure in figures)
+            return f"Passed: all {count} limits are kept.", "pass"
         if self.model.jobs.busy and self.model.saved:
             return "Saved. You can validate it now; the stages are computed again.", ""
         if self.model.jobs.busy:
@@ -471,10 +472,8 @@ def write_session_report(path: Path, step: Step) -> None:
     colours = colour_table(step.context.display.value.colours)
 
     def work(_progress: object) -> None:
-        from gelpolight_core.output.report import (
-            calibration_report,
-            report_pdf_file,  # slow to import
-        )
+        # Slow to import.
+        from gelpolight_core.output.report import calibration_report, report_pdf_file
 
         run = project.finish()
         calibration, saved = run.calibration, workspace.entry_of(run.calibration.identity)

@@ -163,7 +163,7 @@ class StepPanel(QWidget):
         inside = QWidget()
         self._scroll = set_names(scroll_area(inside), "calibrate.panel.scroll", "This step")
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._extra = QVBoxLayout()
+        self._extra, self._below = QVBoxLayout(), QVBoxLayout()
         self.title = named_label("calibrate.title", "Step", wrap=False, bold=1.5)
         self.task = named_label("calibrate.task", "Task")
         self.help = StepHelp()
@@ -173,6 +173,7 @@ class StepPanel(QWidget):
             self._build_number(),
             self._extra,
             self._build_message(),
+            self._below,
             self._build_details(),
             None,
             of=inside,
@@ -278,12 +279,15 @@ class StepPanel(QWidget):
         self._foot = vbox(*parts, of=foot, margins=(16, 8, 16, 16), spacing=8)
         return foot
 
-    def add_extra(self, text: str, field: QWidget) -> QFrame:
-        """Add the card of a value that a step needs. The step shows and hides it."""
+    def add_extra(self, text: str, field: QWidget, *, below: bool = False) -> QFrame:
+        """Add the card of a value that a step needs, above or below the message about the step.
+
+        The step shows and hides it.
+        """
         caption = PlainLabel(text)
         set_text_role(caption, "muted")
         frame = card(caption, field)
-        self._extra.addWidget(frame)
+        (self._below if below else self._extra).addWidget(frame)
         QWidget.setTabOrder(self.lay, field)
         frame.hide()
         return frame

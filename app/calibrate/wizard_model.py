@@ -132,9 +132,9 @@ class WizardModel(QObject):
 
     @property
     def saved(self) -> str:
-        """Name of the saved calibration, if it belongs to the present captures."""
-        path = self.saved_path
-        return path.stem if path and self._saved_inputs == self.project.all_inputs else ""
+        """Name of the saved calibration, if it still exists and belongs to the present captures."""
+        path, inputs = self.saved_path, self._saved_inputs
+        return path.stem if path and path.exists() and inputs == self.project.all_inputs else ""
 
     def use_calibration(self, path: Path) -> None:
         """Remember the saved calibration of this session."""

@@ -65,7 +65,8 @@ def _row(figure: Finding, *, narrow: bool) -> str:
     sign = verdict.sign if narrow else f"{verdict.sign} {verdict.word}"
     if verdict is Verdict.PASS and not figure.limit_text:
         sign = ""  # not judged
-    limit = f"<span style='color: @muted'>{escaped(figure.limit_text)}</span>"
+    limit = escaped(f"limit {figure.limit_text}" if figure.limit_text else "")
+    limit = f"<span style='color: @muted'>{limit}</span>"
     between = "<br>" if narrow else f"</td>{cell}'>"  # a side panel has no room for another column
     row = (
         f"<tr><td width='1%' style='{colour}'><b>{sign}</b></td>"

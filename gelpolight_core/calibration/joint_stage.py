@@ -42,8 +42,11 @@ def _joint_facts(c: OpenSensor) -> Facts:
     )
 
 
-WORTH = "How far a term changes the calculated light of the presses (rms), all else fitted again"
-"""The meaning of the figures of terms."""
+WORTH = (
+    "A term is needed if held-out presses are better with it, whatever its size. This is how far"
+    " it changes the calculated light of the presses (rms), all else fitted again"
+)
+"""Which terms are needed, and the meaning of their figures."""
 
 
 class TermFact(NamedTuple):

@@ -49,11 +49,10 @@ from .result_pictures import (
     ResultPicture,
 )
 
-ROLE_COLOURS = dict(zip(LED_ROLES, COLOURS, strict=True)) | {
-    "accent": "#1f4fbf",
-    "warn": "#c77800",
-    "muted": "0.6",
-}
+ROLE_COLOURS = dict(zip(LED_ROLES, COLOURS, strict=True))
+ROLE_COLOURS |= {"accent": "#1f4fbf", "warn": "#c77800", "muted": "0.6"}
+BEHIND = {"fc": "white", "ec": "none", "pad": 0.5}
+"""A text lies on no line."""
 VERDICT_COLOURS = {Verdict.PASS: "0.1", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
 
 
@@ -110,9 +109,8 @@ def lens_residuals(figure: Figure, result: LensResult) -> str:
     cloud_axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     cloud_axes.set(title="All residuals", xlabel="horizontal (px)", ylabel="vertical (px)")
     return (
-        "Residuals of the fit. Arrows with a common direction in one part of the image, or a "
-        "ring in the right plot, would mean that the lens model does not fit; white parts "
-        "contain no corners"
+        "Residuals of the fit. Arrows with a common direction in one part of the image, or a ring "
+        "in the right plot, would mean that the lens model does not fit; white parts: no corners"
     )
 
 
@@ -159,11 +157,8 @@ def _paint_pose(
     title = f"Residuals, {factor:.0f} times enlarged; RMS {view.pose.rms_px:.3f} px"
     residual_axes.set(aspect="equal", title=title, xlabel="u (px)", ylabel="v (px)")
     residual_axes.invert_yaxis()
-    return (
-        f"The board on the top surface, {result.plane.distance_mm:.3f} "
-        "mm from the camera, tilted by "
-        f"{result.tilt_deg:.2f} degrees"
-    )
+    caption = f"The board on the top surface, {result.plane.distance_mm:.3f} mm from the camera"
+    return f"{caption}, tilted by {result.tilt_deg:.2f} degrees"
 
 
 @drawing(68.0)
@@ -239,11 +234,12 @@ def _paint_mark(axes: Axes, mark: Mark) -> None:
             axes.plot(x, y, color=ROLE_COLOURS[role], lw=1.0)
         case Label(x, y, text, role, above_end):
             ha, va = ("right", "bottom") if above_end else ("center", "center")
-            axes.text(x, y, printable(text), color=ROLE_COLOURS[role], ha=ha, va=va)
-        case Level(value, text):
-            axes.axhline(value, color=ROLE_COLOURS["warn"], ls="--", lw=0.8)
-            half = ("axes fraction", "data")
-            axes.annotate(text, (0.5, value), xycoords=half, ha="center", va="bottom")
+            axes.text(x, y, printable(text), color=ROLE_COLOURS[role], ha=ha, va=va, bbox=BEHIND)
+        case Level(value, text, role, place):
+            axes.axhline(value, color=ROLE_COLOURS[role], ls="--", lw=0.8)
+            across = axes.get_yaxis_transform()  # a share of the width, and the value
+            ha = "right" if place == 1.0 else "center"
+            axes.text(place, value, text, transform=across, ha=ha, va="bottom", bbox=BEHIND)
         case Field(values, (left, right, top, bottom), reach):
             extent, colours = (left, right, bottom, top), ListedColormap(DIVERGING / 255.0)
             image = axes.imshow(values, extent=extent, cmap=colours, vmin=-reach, vmax=reach)
@@ -287,8 +283,7 @@ def factors(figure: Figure, calibration: OpenSensor, colours: ColourTable | None
     draw_three_maps(figure, calibration.factors, calibration.table.grid, "factor", colours)
     return (
         "Reflectance factor of the bare membrane (Eq. 9): 1 means as bright as predicted. Dark "
-        "specks are dirt or holes; a slope from one side to the other indicates that a light "
-        "has moved"
+        "specks are dirt or holes; a slope from side to side indicates that a light has moved"
     )
 
 
@@ -323,9 +318,8 @@ def _paint_ball(axes: Axes, press: BallPress, image: Float32Array, grid: Membran
     indentation, pitch_mm = press.indentation, grid.pitch_mm
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     show_image(axes, image, width_px=700, extent=grid_extent(grid))
-    axes.plot(
-        *(origin + pitch_mm * indentation.contour).T, ".", color="white", markersize=1.8, mew=0.0
-    )
+    edge = origin + pitch_mm * indentation.contour
+    axes.plot(*edge.T, ".", color="white", markersize=1.8, mew=0.0)
     x, y = origin + pitch_mm * np.asarray(indentation.centre)
     radius = pitch_mm * indentation.contact_radius_px
     axes.add_patch(Circle((x, y), radius, fill=False, color=ACCENT, lw=0.7, zorder=3))
@@ -333,10 +327,8 @@ def _paint_ball(axes: Axes, press: BallPress, image: Float32Array, grid: Membran
     reach = 2.2 * radius
     axes.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
     verdict, name = press.quality.verdict, printable(PurePath(press.name).name)
-    title = (
-        f"{verdict.sign} {name}\nR {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
-    )
-    axes.set_title(title, fontsize=6.5, color=VERDICT_COLOURS[verdict])
+    size = f"R {press.pose.radius_mm:.2f}, depth {press.pose.depth_mm:.2f} mm"
+    axes.set_title(f"{verdict.sign} {name}\n{size}", fontsize=6.5, color=VERDICT_COLOURS[verdict])
 
 
 @drawing(62.0)

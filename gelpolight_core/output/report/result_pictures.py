@@ -16,9 +16,10 @@ import numpy as np
 
 from gelpolight_core.base.arrays import Float32Array, Float64Array
 from gelpolight_core.base.compared_quantity import COVERAGE, PAPER_PERCENT
+from gelpolight_core.base.finding import Verdict, join_quality_tables
 from gelpolight_core.calibration.closed_sensor_recipe import BALLS as CLOSED_BALLS
 from gelpolight_core.calibration.joint_stage import JOINT
-from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
+from gelpolight_core.calibration.open_ball_stages import BALLS, REFLECTANCE
 from gelpolight_core.calibration.open_sensor_recipe import LENS, TOP_POSE
 from gelpolight_core.calibration.project import CalibrationRun
 from gelpolight_core.calibration.recipes import recipe_named
@@ -28,23 +29,19 @@ from gelpolight_core.sensor.closed_sensor.closed_sensor_data import ClosedSensor
 from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
 
 Role = Literal["accent", "warn", "muted", "red", "green", "blue"]
-DIVERGING = np.concatenate(
-    [
-        np.linspace(start, stop, 128)
-        for start, stop in pairwise(((33, 92, 172), (247, 247, 247), (178, 24, 43)))
-    ]
-).astype(np.uint8)
+ENDS = np.array([(33, 92, 172), (247, 247, 247), (178, 24, 43)])
+DIVERGING = np.concatenate([np.linspace(a, b, 128) for a, b in pairwise(ENDS)]).astype(np.uint8)
 """Colours (256, 3) of a field: blue, white, red."""
 LED_ROLES: tuple[Role, ...] = ("red", "green", "blue")
 DEPTHS_MM = np.geomspace(0.1, 1.5, 40)
 """Depths for which the uncertainty is predicted."""
 SIZES_MM = (3.0, 7.0)
 """Smallest and largest object for which it is predicted: the size hardly matters."""
-TEXT_SHARE = 0.2
+TEXT_SHARE = 0.3
 """Height of a line of text over that of a small chart; a plan is twice as high."""
 MOST_NAMES = 20
 """Presses that are named in a picture. Chosen: names of more would overlap."""
-BOARDS = "Grey: board on the top surface."
+AREA = "Grey: working area"
 ELLIPSE_MM = 1.0
 """Length of the largest half axis of the drawn uncertainty of an LED. Its text is beside it."""
 
@@ -76,10 +73,12 @@ class Label(NamedTuple):
 
 
 class Level(NamedTuple):
-    """A dashed horizontal line with its text."""
+    """A dashed horizontal line with its text in the middle or on the right (1)."""
 
     y: float
     text: str
+    role: Role = "warn"
+    place: float = 0.5
 
 
 class Field(NamedTuple):
@@ -137,15 +136,18 @@ def result_pictures(c: Calibration, run: CalibrationRun | None) -> tuple[ResultP
 
 
 def _of_closed(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
-    balls = c.data_of(ClosedSensor).balls
-    names = tuple(ball[0] for ball in balls)
-    plan = _plan(names, tuple((x, y, contact) for _, x, y, contact, _ in balls))
+    data = c.data_of(ClosedSensor)
+    names, grid = tuple(ball[0] for ball in data.balls), data.in_place.grid
+    area = Line(grid.x_mm[[0, -1, -1, 0, 0]], grid.y_mm[[0, 0, -1, -1, 0]], "muted")
+    rings = tuple((x, y, contact) for _, x, y, contact, _ in data.balls)
+    plan = _plan(names, rings, (area,), f"{AREA}.")
     expected = _uncertainty(c, "ball")
     if run is None:
         return expected, plan
-    presses = run.results[CLOSED_BALLS].result.presses
-    errors = np.array([press.held_out.cap_ratio - 1.0 for press in presses])
-    return _bars(c, "held_out_cap_percent", names, errors), expected, plan
+    found = run.results[CLOSED_BALLS]
+    errors = np.array([press.held_out.cap_ratio - 1.0 for press in found.result.presses])
+    odd, cut = {size.name for size in found.sizes if size.remedy}, "the edge of the image cuts them"
+    return _bars(c, "held_out_cap_percent", names, errors, odd, cut), expected, plan
 
 
 def _of_open(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture, ...]:
@@ -154,15 +156,20 @@ def _of_open(c: Calibration, run: CalibrationRun | None) -> tuple[ResultPicture,
     stated = () if data.length_errors is None else (_uncertainty(c, "cylinder"),)
     leds, factor = _leds(data)
     about = f"Ellipses: LEDs, two standard deviations, {factor:.0f} times as large."
+    area = _ring(*data.surface.axis_mm, 0.5 * data.sensor.working_diameter_mm * np.eye(2), "muted")
     if run is None or joint is None or joint.checked is None:
-        return (*stated, _plan((), (), leds, about))
-    balls, checked = joint.refined.balls, joint.checked
-    bars = _bars(c, "ball_height_error_percent", joint.refined.ball_names, checked.height_errors)
+        return (*stated, _plan((), (), (area, *leds), f"{AREA}. {about}"))
+    balls, checked, names = joint.refined.balls, joint.checked, joint.refined.ball_names
+    odd = {fit.name for fit in run.results[REFLECTANCE].table.agreements if fit.fault}
+    odd |= {p.name for p in run.results[BALLS].presses if p.quality.verdict is not Verdict.PASS}
+    why = "their tops are not solved"
+    bars = _bars(c, "ball_height_error_percent", names, checked.height_errors, odd, why)
     rings = tuple(
         (*ball.centre_mm, math.sqrt(ball.depth_mm * (2.0 * ball.radius_mm - ball.depth_mm)))
         for ball in balls
     )
-    plan = _plan(joint.refined.ball_names, rings, (*_boards(run), *leds), f"{BOARDS} {about}")
+    marks = area, *_boards(run), *leds
+    plan = _plan(names, rings, marks, f"{AREA}, boards on the top surface. {about}")
     return bars, *stated, plan, _left(data, checked.left, checked.step)
 
 
@@ -170,24 +177,31 @@ DRAWN = {REFLECTANCE: _of_open, CLOSED_BALLS: _of_closed}
 """The pictures of a recipe that has a stage."""
 
 
-def _bars(c: Calibration, key: str, names: Sequence[str], errors: Float64Array) -> ResultPicture:
-    """Return the relative errors of the presses, worst first, with the limit of a figure."""
-    figures = (f for table in c.quality.values() for f in table.figures if f.key == key)
-    limit = next((f.warn_limit for f in figures if f.warn_limit is not None), math.inf)
-    known = ((100.0 * abs(e), PurePath(n).stem) for n, e in zip(names, errors, strict=True))
-    worst_first = sorted(((e, n) for e, n in known if math.isfinite(e)), reverse=True)
-    odd = [n for e, n in worst_first if e > limit]
-    values, stems = zip(*worst_first, strict=True) if worst_first else ((), ())
-    roles: tuple[Role, ...] = tuple("warn" if name in odd else "accent" for name in stems)
-    marks: list[Mark] = [Bars(stems, values, roles)]
-    if math.isfinite(limit):
-        marks.append(Level(limit, f"limit {limit:g} %"))
-    caption = "All are within the limit."
-    if odd:
-        caption = f"Beyond the limit: {', '.join(odd)}. Check the diameter, and press it again."
-    return ResultPicture(
-        "balls", "Height error of each ball press (%)", caption, ("", "%"), tuple(marks)
-    )
+def _bars(
+    c: Calibration, key: str, names: Sequence[str], errors: Float64Array, odd: set[str], why: str
+) -> ResultPicture:
+    """Return the relative errors of the presses, worst first, and their typical value as judged.
+
+    The limit is that of the typical error. A press is marked as in its own step: those of `odd`.
+    `why` some have no error is a clause.
+    """
+    typical = join_quality_tables(c.quality.values())[key]
+    known = ((100.0 * abs(e), n) for n, e in zip(names, errors, strict=True) if math.isfinite(e))
+    worst_first = sorted(known, reverse=True)
+    roles: tuple[Role, ...] = tuple("warn" if n in odd else "accent" for _, n in worst_first)
+    stems = tuple(PurePath(n).stem for _, n in worst_first)
+    bars = Bars(stems, tuple(e for e, _ in worst_first), roles)
+    role: Role = "muted" if typical.verdict is Verdict.PASS else "warn"
+    marks: list[Mark] = [bars, Level(typical.value, "typical error", role, 1.0)]
+    if typical.warn_limit is not None:
+        marks.append(Level(typical.warn_limit, "limit of the typical error"))
+    caption = f"{typical.verdict.word}: typical error {typical.value_text} ({typical.limit_text})."
+    if "warn" in roles:
+        caption += " Orange: not passed in Ball presses."
+    if unknown := len(names) - len(worst_first):
+        caption += f" {unknown} of {len(names)} presses have no height: {why}."
+    title = "Height error of each ball press (%)"
+    return ResultPicture("balls", title, caption, ("", "%"), tuple(marks))
 
 
 def _uncertainty(c: Calibration, shape: str) -> ResultPicture:
@@ -200,23 +214,20 @@ def _uncertainty(c: Calibration, shape: str) -> ResultPicture:
     height, across = 100.0 * COVERAGE * largest.T
     tolerance = PAPER_PERCENT["depth"]
     decides = DEPTHS_MM[height < tolerance]
-    caption = f"No height can be judged by a tolerance of {tolerance:g} %."
+    caption = f"No height can be judged by a tolerance of {tolerance:g} %"
     if decides.size:
-        caption = (
-            f"Heights can be judged by a tolerance of {tolerance:g} % from {decides[0]:.2g} to "
-            f"{decides[-1]:.2g} mm deep; diameters are known within {across.max():.2g} %."
-        )
+        reach = f"{decides[0]:.2g} to {decides[-1]:.2g} mm deep"
+        caption = f"Heights can be judged by a tolerance of {tolerance:g} % from {reach}"
+    caption += f"; diameters are known within {across.max():.2g} %."
     marks: list[Mark] = [Level(tolerance, f"tolerance {tolerance:g} %")]
-    free, line = 0.0, TEXT_SHARE * max(height.max(), across.max(), tolerance)
+    # The names are above all curves, which do not strike them through.
+    line = TEXT_SHARE * max(height.max(), across.max(), tolerance)
+    free = float(max(height[-1], across[-1]))
     roles: dict[str, Role] = {"height": "accent", "diameter": "green"}
-    curves = {"height": height, "diameter": across}
-    for name, values in sorted(curves.items(), key=lambda curve: float(curve[1][-1])):
-        end = max(float(values[-1]), free)
-        marks += (
-            Line(DEPTHS_MM, values, roles[name]),
-            Label(DEPTHS_MM[-1], end, name, roles[name], True),
-        )
-        free = end + line
+    curves = zip(roles.items(), (height, across), strict=True)
+    for (name, role), values in sorted(curves, key=lambda curve: float(curve[1][-1])):
+        marks += Line(DEPTHS_MM, values, role), Label(DEPTHS_MM[-1], free, name, role, True)
+        free += line
     title = "Expected uncertainty of {}s of {:g} to {:g} mm, k = 2 (%)".format(shape, *SIZES_MM)
     return ResultPicture("uncertainty", title, caption, ("depth (mm)", "%"), tuple(marks))
 
@@ -260,9 +271,8 @@ def _leds(data: OpenSensor) -> tuple[tuple[Mark, ...], float]:
     sd_mm = COVERAGE * full.led_sd_mm[:, :2]
     factor = max(float(f"{ELLIPSE_MM / max(float(sd_mm.max()), 1e-9):.0e}"), 1.0)
     marks: list[Mark] = []
-    for (x, y), sd, role in zip(
-        full.led_positions_mm[:, :2].tolist(), sd_mm, LED_ROLES, strict=True
-    ):
+    places = full.led_positions_mm[:, :2].tolist()
+    for (x, y), sd, role in zip(places, sd_mm, LED_ROLES, strict=True):
         marks.append(_ring(x, y, np.diag(factor * sd), role))
         text = f"\N{PLUS-MINUS SIGN}{1e3 * sd.max():.0f} \N{MICRO SIGN}m"
         marks.append(Label(x, y + math.copysign(2.5 * ELLIPSE_MM, y), text, role))

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 import scene
 
-from app.calibrate.result_step import changes_since, corrective_action, terms_markup
+from app.calibrate.result_step import (
+    changes_since,
+    corrective_action,
+    last_calibration,
+    terms_markup,
+)
+from app.program.workspace import Workspace
 from gelpolight_core.base.finding import QualityTable, judge
 from gelpolight_core.base.root_causes import MODEL
 from gelpolight_core.calibration.closed_sensor.press_sizes import PressSize
@@ -63,7 +69,25 @@ def test_leds_and_light_are_compared_with_those_of_the_last_calibration():
     full = now.data.full
     moved = replace(full, led_positions_mm=full.led_positions_mm + np.array([0.0, 0.003, 0.004]))
     last = now.changed(full=replace(moved, background=full.background / 0.996))
-    assert list(changes_since(last, now)) == ["LEDs within 5 \N{MICRO SIGN}m", "light -0.4 %"]
+    assert list(changes_since(last, now)) == ["LEDs within 0.005 mm", "light -0.4 %"]
+
+
+def test_only_a_usable_calibration_of_the_same_sensor_is_compared(tmp_path):
+    now, workspace = scene.full_calibration(), Workspace(tmp_path / "workspace")
+
+    def keep(name: str, day: int, error_percent: float, serial: str = now.serial) -> None:
+        figure = judge("ball_height_error_percent", "E", error_percent, "%", warn=2.0, fail=4.0)
+        made = replace(now.provenance, created=f"2026-03-{day:02}T12:00:00+00:00", inputs=name)
+        sensor = replace(now.data.sensor, serial=serial)
+        c = replace(now.changed(sensor=sensor), provenance=made)
+        c = replace(c, quality={"joint": QualityTable((figure,))})
+        workspace.keep_calibration(c, name)
+
+    assert last_calibration(now, workspace) == ""
+    keep("usable", 1, 0.25)
+    keep("draft", 2, 9.0)
+    keep("another", 3, 0.5, serial="other")
+    assert "0.25 %, LEDs within 0.000 mm" in last_calibration(now, workspace)
 
 
 @pytest.mark.function("See what each term of the light is worth")

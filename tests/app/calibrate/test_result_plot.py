@@ -1,10 +1,16 @@
 """A picture of the result in the window."""
 
+from dataclasses import replace
+
 import numpy as np
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.calibrate.result_plot import ResultPlot
+from app.widgets.label import PlainLabel
+from app.widgets.layout import scroll_area, vbox
 from gelpolight_core.output.report.result_pictures import Bars, Level, Line, ResultPicture
 
 
@@ -36,3 +42,28 @@ def test_charts_begin_at_zero_and_show_their_limits(qtbot):
     _, (low, high) = plot.plot.viewRange()
     assert low == 0.0
     assert high > 8.0
+
+
+def test_pictures_keep_their_texts_and_heights_in_a_low_window_and_leave_the_wheel_to_the_page(
+    qtbot,
+):
+    marks = (Line(np.arange(3.0), np.arange(3.0), "accent"),)
+    picture = ResultPicture("uncertainty", "U", "A long caption. " * 12, ("depth (mm)", "%"), marks)
+    plots, inside = [ResultPlot(picture), ResultPlot(replace(picture, labels=("", "")))], QWidget()
+    vbox(*plots, of=inside)
+    area = scroll_area(inside)
+    qtbot.addWidget(area)
+    area.resize(420, 200)
+    area.show()
+    qtbot.waitExposed(area)
+    for plot, least in zip(plots, (100, 150), strict=True):
+        assert plot.plot.height() >= least
+        for label in plot.findChildren(PlainLabel):
+            assert label.height() >= label.heightForWidth(label.width())
+    viewport, at = plots[0].plot.viewport(), QPointF(80.0, 40.0)
+    down, nothing = QPoint(0, -120), Qt.KeyboardModifier.NoModifier
+    place, phase = viewport.mapToGlobal(at), Qt.ScrollPhase.NoScrollPhase
+    button = Qt.MouseButton.NoButton
+    event = QWheelEvent(at, place, QPoint(), down, button, nothing, phase, False)
+    QApplication.sendEvent(viewport, event)
+    assert not event.isAccepted(), "the page gets it"

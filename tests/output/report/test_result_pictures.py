@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import replace
+from pathlib import PurePath
 
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration.height_limits import judged_for
 from gelpolight_core.calibration.joint_stage import JOINT
+from gelpolight_core.calibration.open_ball_stages import REFLECTANCE
 from gelpolight_core.measurement.measurable_depth import measurable_depth
 from gelpolight_core.measurement.object_measurement import measure_heightmap
 from gelpolight_core.measurement.size_uncertainty import expected_sd
@@ -43,35 +46,62 @@ def test_no_text_of_the_plan_lies_on_another_one(small_run):
             assert math.hypot(one.x - other.x, one.y - other.y) > 0.1 * height_mm
 
 
-def test_curves_of_the_uncertainty_are_named_at_their_ends(small_run):
+def test_curves_of_the_uncertainty_are_named_above_their_ends(small_run):
+    """No curve strikes a name through."""
     picture = pictures_of(small_run)["uncertainty"]
-    ends = sorted(line.y[-1] for line in marks_of(picture, Line))
+    ends = {line.role: line.y[-1] for line in marks_of(picture, Line)}
     labels = sorted(marks_of(picture, Label), key=lambda label: label.y)
     assert {label.text for label in labels} == {"height", "diameter"}
-    assert labels[0].y == pytest.approx(ends[0])
+    assert [label.role for label in labels] == sorted(ends, key=ends.get)
+    assert labels[0].y == pytest.approx(max(ends.values()))
     top = max(max(line.y) for line in marks_of(picture, Line))
-    assert labels[1].y >= max(ends[1], labels[0].y + 0.1 * top)
+    assert labels[1].y >= labels[0].y + 0.1 * top
 
 
 @pytest.mark.function("See the height error of each ball, the worst first")
-def test_the_worst_ball_comes_first_and_is_marked_beyond_the_limit(small_run):
+def test_the_worst_ball_comes_first_and_presses_without_an_error_are_counted(small_run):
+    """The limit of the typical error is none of one press."""
     joint = small_run.results[JOINT]
     errors = np.linspace(0.001, 0.008, len(joint.checked.height_errors))
     errors[1], errors[2] = -0.3, math.nan
     joint = replace(joint, checked=replace(joint.checked, height_errors=errors))
     picture = pictures_of(replace(small_run, results=small_run.results.having(JOINT, joint)))
-    (bars,), (limit,) = (marks_of(picture["balls"], kind) for kind in (Bars, Level))
+    (bars,) = marks_of(picture["balls"], Bars)
     assert bars.y[0] == pytest.approx(30.0)
     assert list(bars.y) == sorted(bars.y, reverse=True)
     assert len(bars.y) == len(errors) - 1
-    assert [role for role, e in zip(bars.roles, bars.y, strict=True) if e > limit.y] == ["warn"]
-    assert bars.names[0] in picture["balls"].caption
+    assert f"1 of {len(errors)}" in picture["balls"].caption
+    figure = small_run.calibration.quality["joint"]["ball_height_error_percent"]
+    typical, limit = marks_of(picture["balls"], Level)
+    assert (typical.y, limit.y) == (figure.value, figure.warn_limit)
+    assert set(bars.roles) == {"accent"}
+
+
+def test_a_press_is_marked_as_in_its_own_step(small_run):
+    reflectance = small_run.results[REFLECTANCE]
+    first, *others = reflectance.table.agreements
+    agreements = (replace(first, odd_share=0.9), *others)
+    table = replace(reflectance.table, agreements=agreements)
+    results = small_run.results.having(REFLECTANCE, replace(reflectance, table=table))
+    (bars,) = marks_of(pictures_of(replace(small_run, results=results))["balls"], Bars)
+    marked = [n for n, role in zip(bars.names, bars.roles, strict=True) if role == "warn"]
+    assert marked == [PurePath(first.name).stem]
+
+
+def test_a_typical_error_beyond_its_limit_is_marked(small_run):
+    tables = judged_for(small_run.calibration.quality, 1e-3)
+    calibration = replace(small_run.calibration, quality=tables)
+    typical, limit = marks_of(result_pictures(calibration, small_run)[0], Level)
+    assert typical.y > limit.y
+    assert typical.role == "warn"
 
 
 def test_the_plan_shows_leds_and_contacts_where_they_are(small_run):
     balls, full = small_run.results[JOINT].refined.balls, small_run.calibration.data.full
     picture = pictures_of(small_run)["plan"]
     rings = {tuple(np.round([line.x.mean(), line.y.mean()], 1)) for line in marks_of(picture, Line)}
+    width_mm = small_run.calibration.data.sensor.working_diameter_mm
+    assert any(np.ptp(line.x) == pytest.approx(width_mm) for line in marks_of(picture, Line))
     for x, y in (*(ball.centre_mm for ball in balls), *full.led_positions_mm[:, :2]):
         assert any(math.hypot(x - at[0], y - at[1]) < 0.2 for at in rings)
     named = [label for label in marks_of(picture, Label) if label.role == "accent"]
