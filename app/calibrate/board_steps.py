@@ -220,9 +220,8 @@ class LensStep(ImageStep):
                         view = refused_view(path.name, fault)
                     self._views = {**self._views, path.name: view}
 
-        self.model.short_jobs.submit(
-            BackgroundJob("Analysing the lens views", work, lambda _: self.model.changed.emit())
-        )
+        job = BackgroundJob("Analysing the lens views", work, lambda _: self.model.changed.emit())
+        self.model.short_jobs.submit(job)
 
 
 def judge_view(view: LensView | None) -> Finding | None:
@@ -262,9 +261,8 @@ def detect_top_pose(
         marks = ImageOverlay() if view is None else board_marks(view)
         marks += ImageOverlay((foot_point(camera, pose.plane),))
         place = f"at {pose.plane.distance_mm:.2f} mm and tilted by {pose.tilt_deg:.2f} degrees"
-        return judged_detection(
-            marks, pose.quality.figures, f"Board found. The top surface is {place}."
-        )
+        text = f"Board found. The top surface is {place}."
+        return judged_detection(marks, pose.quality.figures, text)
 
     return detect_or_refusal(detect)
 

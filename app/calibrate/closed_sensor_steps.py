@@ -107,9 +107,8 @@ def detect_scale(rgb: PixelArray, untouched: LazyBackground) -> Detection:
         if pressed.pin_spacing_mm is not None:
             pins = find_pins(*images, grid=grid, where="Image")
             pins_px = pins.pins_px
-            marks = ImageOverlay(
-                markers=tuple(OverlayMarker(u, v, "dot", "good") for u, v in pins_px)
-            )
+            dots = tuple(OverlayMarker(u, v, "dot", "good") for u, v in pins_px)
+            marks = ImageOverlay(markers=dots)
             x, y = pressed.pin_spacing_mm / pins.spacing_px
             text = f"{len(pins_px)} pins found: a pixel is {x:.4f} mm wide and {y:.4f} mm high."
         else:
@@ -138,9 +137,8 @@ class ScaleStep(ImageStep):
         files = session.found("background")
         if not files:
             return detect_nothing
-        untouched = LazyBackground(
-            files[-1], session.in_place or ClosedSensorSettings(), session.response
-        )
+        declared = session.in_place or ClosedSensorSettings()
+        untouched = LazyBackground(files[-1], declared, session.response)
         return partial(detect_scale, untouched=untouched)
 
     def depends_on(self) -> tuple[Any, ...]:
@@ -231,8 +229,6 @@ class InPlaceBallsStep(BallsStep):
 
     of = BALLS
     guide = "guide/closed-sensors", "ball-presses"
-    task = "Press the ball where the ring is, and hold it still."
-    assembly = "ball"
     frames, wanted, least = 4, ENOUGH_BALLS, LEAST_PRESSES
     advice = "Its slopes must be as steep as what you want to measure."
 
@@ -316,9 +312,8 @@ class InPlaceBallsStep(BallsStep):
         progress = self.progress
         if progress is None:
             return None
-        return Finding(
-            "normal_error_deg", "Expected error of the normals", progress.error_deg, "deg"
-        )
+        text = "Expected error of the normals"
+        return Finding("normal_error_deg", text, progress.error_deg, "deg")
 
     def progress_line(self) -> str:
         """Return the number of presses, and the effect of one more."""

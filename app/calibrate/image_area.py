@@ -271,14 +271,16 @@ class ImageArea(QWidget):
         return super().eventFilter(watched, event)
 
     def _place(self) -> None:
-        right = self.stack.geometry().right() - EDGE
-        for button in (self.result, self.back_to_live):
-            if button.isVisibleTo(self):
-                button.adjustSize()
-                right -= button.width()
-                button.move(right, self.stack.y() + EDGE)
-                button.raise_()
-                right -= EDGE
+        right, top = self.stack.geometry().right() - EDGE, self.stack.y() + EDGE
+        shown = [b for b in (self.result, self.back_to_live) if b.isVisibleTo(self)]
+        widths = sum(button.sizeHint().width() + EDGE for button in shown)
+        if right - widths < self.view.bar.geometry().right():
+            top += self.view.bar.geometry().bottom()
+        for button in shown:
+            button.adjustSize()
+            right -= button.width() + EDGE
+            button.move(right + EDGE, top)
+            button.raise_()
         self.verdict.place()
 
     def _build_lost(self) -> QWidget:

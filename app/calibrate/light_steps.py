@@ -87,12 +87,10 @@ def detect_mirror(
         Boards that may have been left in place of the mirror.
     """
     positions = () if expected_px is None else tuple(expected_px)
-    expected = ImageOverlay(
-        tuple(
-            OverlayMarker(float(u), float(v), "ring", "expected", text="expected")
-            for u, v in positions
-        )
+    rings = (
+        OverlayMarker(float(u), float(v), "ring", "expected", text="expected") for u, v in positions
     )
+    expected = ImageOverlay(tuple(rings))
 
     def detect() -> Detection:
         try:
@@ -154,13 +152,12 @@ class LightsStep(ImageStep):
             return
         led, path = int(handle.removeprefix("mirror.")), self._path(self.model.page.shown)
         session = self.session
-        self.model.short_jobs.submit(
-            BackgroundJob(
-                "Analysing the image",
-                lambda _progress: spot_near(session.image(path), (u, v)),
-                lambda near: self.place_spot(led, near or (u, v)),
-            )
+        job = BackgroundJob(
+            "Analysing the image",
+            lambda _progress: spot_near(session.image(path), (u, v)),
+            lambda near: self.place_spot(led, near or (u, v)),
         )
+        self.model.short_jobs.submit(job)
 
     def place_spot(self, led: int, position: PointXY | None) -> None:
         """Set the position of an LED's mirror spot by hand, with undo."""
@@ -196,11 +193,8 @@ def detect_whiteboard(
         area, small = quarter_size_area(rgb.shape, table), quarter_size(rgb)
         if background is not None and background.shape == rgb.shape:
             if is_same(small, quarter_size(background), area):  # of the known bare membrane
-                raise InputError(
-                    "the image looks the same as the background image",
-                    "Image",
-                    Remedy.WITH_MEMBRANE,
-                )
+                text = "the image looks the same as the background image"
+                raise InputError(text, "Image", Remedy.WITH_MEMBRANE)
         unlit_mask = area & (small.min(axis=2) < LEAST_LIGHT)
         lit_mask = area & ~unlit_mask
         inner_mask = _without_edge(lit_mask)
@@ -223,9 +217,8 @@ def detect_whiteboard(
             judge("specks", "Specks and edges", specks, "%", warn=3.0, fail=20.0, remedy=clean),
             judge("light_range", ratio_text, light_ratio, warn=40.0, remedy=even_out),
         )
-        return judged_detection(
-            circle + ImageOverlay(masks=masks), figures, "The whiteboard is well lit."
-        )
+        marks = circle + ImageOverlay(masks=masks)
+        return judged_detection(marks, figures, "The whiteboard is well lit.")
 
     return detect_or_refusal(detect, marks=circle)
 
@@ -279,9 +272,8 @@ class WhiteboardStep(LightStep):
             return ()
         text = "Light intensity in percent of full scale"
         display = self.context.display.value
-        return led_panels(
-            light.radiance, light.usable, table.grid, text, display, unit="%", factor=100.0
-        )
+        maps = light.radiance, light.usable, table.grid
+        return led_panels(*maps, text, display, unit="%", factor=100.0)
 
 
 def detect_background(
@@ -308,9 +300,8 @@ def detect_background(
         if not has_whiteboard:
             text = "The membrane is well lit. Make sure nothing touches it, then click Capture."
         masks = suspect_masks(saturation_image(rgb) > 0, to_image_size(check.pressed, rgb))
-        detection = judged_detection(
-            circle + ImageOverlay(masks=masks), check.quality.figures, text
-        )
+        marks = circle + ImageOverlay(masks=masks)
+        detection = judged_detection(marks, check.quality.figures, text)
         if detection.good and not has_whiteboard:  # nothing shows whether something touches it
             return replace(detection, finding=replace(detection.finding, verdict=Verdict.WARN))
         return detection
@@ -334,6 +325,5 @@ class BackgroundStep(LightStep):
         if reflectance is None or table is None:
             return ()
         factors, display = reflectance.factors, self.context.display.value
-        return led_panels(
-            factors.factors, factors.usable, table.grid, "Reflectance factor", display
-        )
+        maps = factors.factors, factors.usable, table.grid
+        return led_panels(*maps, "Reflectance factor", display)

@@ -22,6 +22,7 @@ StepState = tuple[str, str]
 
 RUNNING = "running"
 BEGUN = "begun"
+UNRECORDED = "unrecorded"
 ORDER = ("pass", "warn", "stale", "waiting", "empty", "fail")
 """States of stages, the worst last."""
 
@@ -30,6 +31,7 @@ STATES = {
     "empty": ("empty", "muted"),
     "waiting": ("not computed", "stale"),
     BEGUN: ("incomplete", "muted"),
+    UNRECORDED: ("not recorded yet", "muted"),
     "stale": ("outdated", "stale"),
     RUNNING: ("running", "accent"),
     "pass": ("pass", "pass"),

@@ -67,7 +67,8 @@ class SessionCamera:
         stored = session.camera_settings
         if not self._project.recipe.files(session):
             return ""
-        serial = self._live.serial
+        virtual = self._context.source.virtual
+        serial = self._live.serial if virtual is None else virtual.design.serial
         if (camera is None or stored is None) and serial not in ("", session.serial):
             return (
                 f"This session belongs to sensor {session.serial}, but the images are those of "

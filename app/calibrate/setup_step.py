@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import QUrl, Signal
@@ -51,6 +52,8 @@ class SetupForm(QWidget):
     ----------
     context : AppContext
         Context with the cameras and the selected source.
+    camera_fault : callable, optional
+        Returns why the selected camera is not that of the session, or an empty text.
 
     Signals
     -------
@@ -60,9 +63,9 @@ class SetupForm(QWidget):
 
     accepted = Signal(object)
 
-    def __init__(self, *, context: AppContext) -> None:
+    def __init__(self, *, context: AppContext, camera_fault: Callable[[], str] = str) -> None:
         super().__init__()
-        self._context = context
+        self._context, self._camera_fault = context, camera_fault
         set_names(self, "setup", "Set-up")
         # The foot is always visible, below the part that scrolls.
         holder, foot = (QWidget(maximumWidth=640, minimumWidth=320) for _ in range(2))
@@ -82,24 +85,18 @@ class SetupForm(QWidget):
         self.serial = self.values.inputs["serial"]
         self.facts = named_label("setup.facts", "About this kind of sensor")
         self._prints = QWidget()
-        boards = (
-            ("lens", "Print the board of the lens…"),
-            ("top", "Print the board of the top surface…"),
-        )
-        tip = (
-            "Save this board as an A4 page to print at 100 % scale; measure the squares "
-            "after printing"
-        )
+        lens = "lens", "Print the board of the lens…"
+        top = "top", "Print the board of the top surface…"
+        tip = "An A4 page with this board, to print at 100 %; measure the squares after printing"
         buttons = (
             push_button(f"setup.{name}_board.print", text, partial(self._save_board, k), tip=tip)
-            for k, (name, text) in enumerate(boards)
+            for k, (name, text) in enumerate((lens, top))
         )
         vbox(*buttons, of=self._prints, margins=0, spacing=8)
         self.problem = named_label("setup.problem", "What is missing")
         self.accept = push_button("setup.accept", "", self._on_accept)
         self.accept.setAccessibleName("Start the calibration")
         self.accept.setMinimumHeight(38)
-        set_property(self.accept, "primary", True)
         sensor = set_names(QFrame(), "card", "Sensor")
         vbox(self.values, self.facts, self._prints, of=sensor, margins=16, spacing=8)
         cards = self._title, self._task, self._build_camera(), sensor
@@ -130,8 +127,8 @@ class SetupForm(QWidget):
             label.setVisible(new)
         self.values.show_value(values)
         self.accept.setText("&Start the calibration" if new else "&Apply these values")
+        self._known, self._new = self.stated(), new
         self._check()
-        self._known = self.stated()
 
     def stated(self) -> Session:
         """Return the session with the values of the form.
@@ -184,8 +181,11 @@ class SetupForm(QWidget):
         if fault := serial_fault(values.serial.strip()):
             problem = f"The serial number {fault}."
         self.problem.setText(problem or " ".join(finding.sentence for finding in unusual))
-        set_text_role(self.problem, "fail" if problem else "warn")
-        self.accept.setEnabled(not problem)
+        role = "fail" if self.edited else "muted"  # nothing is wrong before something is typed
+        set_text_role(self.problem, role if problem else "warn")
+        is_due = not problem and (self._new or self.edited)
+        self.accept.setEnabled(is_due)
+        set_property(self.accept, "primary", is_due)
 
     def _build_camera(self) -> QFrame:
         box = set_names(QFrame(), "card", "Camera")
@@ -203,6 +203,8 @@ class SetupForm(QWidget):
     def _show_camera(self) -> None:
         """Show the state of the camera. Enable the settings button if it can be set."""
         text, role, settable = camera_state(self._context)
+        if fault := self._camera_fault():
+            text, role = fault, "warn"
         self.camera.setText(text)
         set_text_role(self.camera, role)
         self.camera_settings.setEnabled(settable)
@@ -237,8 +239,10 @@ class SetupStep(Step):
 
     def build(self) -> None:
         """Create the form."""
-        self.form = SetupForm(context=self.context)
+        fault = partial(self.model.camera.fault, ask=False)
+        self.form = SetupForm(context=self.context, camera_fault=fault)
         self.form.accepted.connect(self._on_stated)
+        self.form.values.changed.connect(lambda *_: self.model.changed.emit())
 
     @property
     def centre(self) -> QWidget:
@@ -250,6 +254,14 @@ class SetupStep(Step):
         state, text = super().state() if self.stages else ("pass", "Stated")
         unusual = unusual_numbers(self.session)
         return ("warn", unusual[0].sentence) if unusual and state == "pass" else (state, text)
+
+    def explain(self, state: str, sentence: str) -> str:
+        """Return the message about the state, unless the form shows it."""
+        return "" if sentence in self.form.problem.text() else sentence
+
+    def is_finished(self, state: str) -> bool:
+        """Return whether all values are applied."""
+        return super().is_finished(state) and not self.form.edited
 
     def focus(self) -> QWidget:
         """Return the first value."""
@@ -274,11 +286,11 @@ class SetupStep(Step):
             self.context.toasts.show("The set-up changes were not applied.", "warn")
 
     def _on_stated(self, entered: Session) -> None:
-        project = self.project
-        before = project.session
-        self.model.correct("Set-up", project.describe, entered, before, None)
-        if project.session is before:
+        before = self.session
+        self.model.correct("Set-up", self.project.describe, entered, before, None)
+        if self.session is before:
             return  # the error message is already shown
-        self.form.show_session(project.session, new=False)
+        self.form.show_session(self.session, new=False)
+        self.model.changed.emit()
         text = "Applied. The stages that depend on these values are computed again."
         self.model.show_notice(text, "pass")

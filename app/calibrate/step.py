@@ -129,6 +129,10 @@ class Step(QObject, StepDeclaration):
         """Return the number of usable images."""
         return sum(capture.used for capture in self.captures())
 
+    def placed(self) -> int:
+        """Return how many objects of the virtual bench were captured."""
+        return len(self.session.found(self.folder))
+
     def is_finished(self, state: str) -> bool:
         """Return whether nothing is left to do in the step."""
         return is_done(state) and self.count() >= self.wanted

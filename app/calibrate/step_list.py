@@ -87,8 +87,7 @@ class BenchSection(QWidget):
         if bench is None:
             return False
         folder = step.folder or PRESSES
-        count = len(step.session.found(folder))
-        step.on_bench(bench.show(folder, count % bench.steps(folder)))
+        step.on_bench(bench.show(folder, step.placed() % bench.steps(folder)))
         self._laid = step, bench.scene, step.count()
         return True
 

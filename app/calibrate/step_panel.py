@@ -24,7 +24,7 @@ from app.widgets import theme
 from app.widgets.actions import add_item
 from app.widgets.icons import FOLDER, painted
 from app.widgets.label import PlainLabel, escaped, plain_tip
-from app.widgets.layout import hbox, keep_space, scroll_area, vbox
+from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.status_icon import StatusIcon
 from app.widgets.text_roles import named_label, set_background_role, set_property, set_text_role
@@ -153,7 +153,10 @@ LEAST_CAPTURES = 2
 
 
 class StepPanel(QWidget):
-    """The side panel of a step. The lower part is always visible and never moves."""
+    """The side panel of a step. The buttons of the lower part are always visible and never move.
+
+    What comes and goes there is above them, and takes its space from the part that scrolls.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -252,7 +255,6 @@ class StepPanel(QWidget):
         self.cancel.setText("Stop")
         for widget in (self.progress, self.cancel):
             widget.setFixedHeight(28)
-            keep_space(widget)
         self.capture, tip = QPushButton("&Capture"), "Capture this image"
         set_names(self.capture, "calibrate.capture", "Capture", tip, "C")
         self.more = set_names(
@@ -269,7 +271,7 @@ class StepPanel(QWidget):
         self.more.setMenu(menu)
         self.capturing = QWidget()
         row = hbox((self.capture, 1), self.more, margins=0, spacing=8)
-        vbox(self.lay, self.live, row, of=self.capturing, margins=0, spacing=8)
+        vbox(self.live, self.lay, row, of=self.capturing, margins=0, spacing=8)
         self.next = set_names(QPushButton("&Next step"), "calibrate.next", "Next step")
         for button in (self.capture, self.next):
             button.setFixedHeight(36)
@@ -316,7 +318,7 @@ class StepPanel(QWidget):
         waits = "" if is_done(page.state) else "No result yet"
         self.caption.setText(waits if number is None else number.text)
         self.caption.setToolTip(plain_tip(self.caption.text()))
-        self.number.setText("\u2013" if number is None else number.value_text)
+        self.number.setText(waits and "\u2013" if number is None else number.value_text)
         self.below.setText(page.below)
         self._sign.show_icon(state_icon(page.state))
         self._word.setText(state_word(page.state).capitalize())
@@ -363,6 +365,7 @@ class StepPanel(QWidget):
         """Show the message about the live image, the running work, and the next step."""
         page, (title, fraction) = self._page, self._page.work
         self.live.setText(page.live[0])
+        self.live.setVisible(bool(page.live[0]))
         set_text_role(self.live, page.live[1])
         self.capture.setEnabled(page.camera)
         self.progress.setVisible(bool(title))

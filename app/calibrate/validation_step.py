@@ -27,6 +27,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.layout import hbox, vbox
 from app.widgets.text_roles import named_label, set_property, set_text_role
 from app.widgets.widget_names import set_names
+from gelpolight_core.base.compared_quantity import DECISIONS
 from gelpolight_core.base.errors import InputError, as_input_error, error_message
 from gelpolight_core.base.finding import Finding
 from gelpolight_core.calibration.annotations import write_validation
@@ -43,7 +44,7 @@ from gelpolight_core.session.validation import WORDS, Validation
 
 from .detection_marks import read_raw
 from .image_panels import ImagePanel, depth_panel
-from .page_state import BEGUN, RemedyButton, StepState
+from .page_state import BEGUN, UNRECORDED, RemedyButton, StepState
 from .press_table import PressTable
 from .result_step import ask_report
 from .step import Step
@@ -127,15 +128,16 @@ class ValidationStep(Step):
         """Return whether the saved calibration is validated."""
         validation = self._recorded()
         if validation is None:
-            is_begun = len(self._presses) > len(self._missing)
-            return BEGUN if is_begun else "empty", "Not validated yet"
+            made = BEGUN if self._missing else UNRECORDED
+            return made if self.placed() else "empty", "Not validated yet"
         if not self.model.saved:
             return "stale", "The captures or corrections have changed since the validation"
-        word, largest = WORDS[validation.verdict], f"{validation.largest_percent:.2g} %"
+        text = f"{WORDS[validation.verdict]} by {validation.basis}. {validation.what_decides}"
         if validation.passed:
             in_use = self.context.workspace.in_use == self.model.saved_path
-            return "pass", f"{word}: {largest}. {'In use' if in_use else 'Not in use'}."
-        return validation.verdict.value, f"{word}. {validation.what_decides}".strip()
+            largest = f"Largest error {validation.largest_percent:.2g} %"
+            text += f"{largest}. {'In use' if in_use else 'Not in use'}."
+        return validation.verdict.value, text.strip()
 
     def number(self) -> Finding | None:
         """Return the largest error of the recorded validation, or else of the present presses."""
@@ -161,7 +163,11 @@ class ValidationStep(Step):
     def progress_line(self) -> str:
         """Return how many of the listed presses are made."""
         total = len(self._presses)
-        return f"{total - len(self._missing)} of {total} presses made" if total else ""
+        return f"{self.placed()} of {total} presses made" if total else ""
+
+    def placed(self) -> int:
+        """Return how many of the listed presses are made."""
+        return len(self._presses) - len(self._missing)
 
     def result_panels(self) -> tuple[ImagePanel, ...]:
         """Return the depth of the press measured last."""
@@ -319,7 +325,7 @@ class ValidationStep(Step):
             depth = f", depth {truth.height_mm:g} mm" if truth.height_mm else ""
             text = f"Press {number} of {count}: {object_name(truth).lower()}{depth}"
         elif count:
-            text = f"All presses are made: {count}"
+            text = "All presses are made"
         else:
             text = "Nothing is listed yet. Add an object below, or measure one press of it."
         self.next_press.setText(text)
@@ -335,9 +341,9 @@ class ValidationStep(Step):
         self.verdict.setVisible(trial is not None and bool(trial.comparisons))
         if trial is not None and trial.comparisons:
             largest = f"largest error {trial.largest_percent:.2g} %. {trial.what_decides}"
-            worst = f"{WORDS[trial.verdict]}, {largest}"
+            text = f"{DECISIONS[trial.verdict].capitalize()} by {trial.basis}, {largest}".strip()
             doubtful = "Not validated: retake the doubtful presses, or leave them out"
-            self.verdict.setText(worst.strip() if recordable else doubtful)
+            self.verdict.setText(text if recordable else doubtful)
             set_text_role(self.verdict, trial.verdict.value if recordable else "warn")
 
     def _trial(self) -> Validation | None:

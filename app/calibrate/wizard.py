@@ -27,7 +27,7 @@ from .closed_sensor_steps import InPlaceBallsStep, ScaleStep
 from .image_area import ImageArea
 from .image_step import plain_step
 from .light_steps import BackgroundStep, LightsStep, WhiteboardStep
-from .page_state import BEGUN, UNJUDGED, PageState, is_done
+from .page_state import BEGUN, UNJUDGED, UNRECORDED, PageState, is_done
 from .result_step import ResultStep
 from .setup_step import SetupStep
 from .step import Step, resolve_page
@@ -150,7 +150,8 @@ class Wizard(QWidget):
         self.live.switched.connect(self._on_camera)
         self.live.lost.connect(lambda why: model.update_page(lost=why))
         # Actions of the user on the shared widgets concern the open step.
-        panel.capture.clicked.connect(lambda: self.open.capture())
+        # Not `clicked`, which an access key sends 0.1 s later, when another object may be pressed.
+        panel.capture.pressed.connect(lambda: self.open.capture())
         panel.import_files.triggered.connect(lambda: self.open.choose_files())
         panel.lay.clicked.connect(self._lay_on_bench)
         area.back_to_live.clicked.connect(lambda: self.open.live())
@@ -251,7 +252,7 @@ class Wizard(QWidget):
         for step in self.steps:
             if step.folder and step.needs_user(states[step.key][0]):
                 return step.key
-        tried = states["validation"][0] not in (StageState.EMPTY.value, BEGUN)
+        tried = states["validation"][0] not in (StageState.EMPTY.value, BEGUN, UNRECORDED)
         ready = is_done(states["result"][0]) and self.model.saved and not tried
         return "validation" if ready else "result"
 

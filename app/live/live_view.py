@@ -59,6 +59,8 @@ class LiveView(QWidget):
         The image.
     tools : dict of str to QAction
         The actions over the image, by name.
+    bar : QWidget
+        Their buttons.
     shown_frames : int
         Number of images shown so far.
 
@@ -96,7 +98,7 @@ class LiveView(QWidget):
         self._histogram = Histogram(self.image)
         self._histogram.hide()
         vbox((self.image, 1), of=self, margins=0, spacing=0)
-        for floating in (self._bar, self._checks):  # over the image: they take no space from it
+        for floating in (self.bar, self._checks):  # over the image: they take no space from it
             floating.setParent(self.image)
             set_background_role(floating, "image")
         self.image.pointed.connect(self._on_pointed)
@@ -109,8 +111,8 @@ class LiveView(QWidget):
 
     def _make_tools(self) -> None:
         self.tools: dict[str, QAction] = {}
-        self._bar = set_names(QWidget(), "live.tools", "Image tools")
-        row = hbox(of=self._bar, margins=(4, 2, 8, 2), spacing=2)
+        self.bar = set_names(QWidget(), "live.tools", "Image tools")
+        row = hbox(of=self.bar, margins=(4, 2, 8, 2), spacing=2)
         for name, text, key, stays, sign, slot in (
             ("fit", "Fit to view", "F", False, "fit", self.image.fit),
             ("full_size", "Full size, 100 %", "1", False, "full-size", self.image.full_size),
@@ -248,7 +250,7 @@ class LiveView(QWidget):
         """Show the magnification. 1: full size, NaN: no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
         self._zoom.setHidden(math.isnan(scale))
-        self._bar.adjustSize()
+        self.bar.adjustSize()
 
     def _on_pointed(self, u: float, v: float) -> None:
         self._pointer = (u, v)
@@ -324,7 +326,7 @@ class LiveView(QWidget):
     def _place(self) -> None:
         """Put the tools into the upper left corner, and the checks along the lower edge."""
         view_rect, checks = self.image.rect(), self._checks.sizeHint().height()
-        self._bar.adjustSize()
+        self.bar.adjustSize()
         self._checks.setGeometry(0, view_rect.height() - checks, view_rect.width(), checks)
         self._histogram.move(
             view_rect.width() - self._histogram.width() - CORNER_PX,

@@ -26,10 +26,11 @@ def show_in_use(context: AppContext) -> None:
         return
     used = read_entry(path, in_use=True)
     note, role = used.state
-    if role == "pass" and used.validation is not None:
-        note = f"{note} {used.validation.largest_percent:.1f} %"
-    day = used.name if used.created is None else f"{used.created.astimezone():%Y-%m-%d}"
     advice = NOT_VALIDATED if role == "warn" else ""
+    if role == "pass" and (trial := used.validation) is not None:
+        note = f"{note} {trial.largest_percent:.1f} %"
+        advice = f"Validated by {trial.basis}: largest error {trial.largest_percent:.2g} %"
+    day = used.name if used.created is None else f"{used.created.astimezone():%Y-%m-%d}"
     if used.summary is not None and (fault := used.summary.fault):
         advice = (
             f"The calibration in use is not reliable: {fault.text}. Calibrate again, or use "

@@ -1,5 +1,6 @@
 """The virtual bench in the wizard: it presses where the ring is, and goes on once started."""
 
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -9,6 +10,7 @@ from app.source_ui.virtual_session import virtual_session
 from app.sources.virtual_bench import VirtualBench
 from gelpolight_core.calibration.open_ball_stages import BALLS
 from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.lab.press_folder import add_presses
 from gelpolight_core.session.description import create_session
 from gelpolight_core.simulation.sensor_design import SensorDesign
 from gelpolight_core.stages.balls.ball_press import next_press_mm
@@ -54,4 +56,25 @@ def test_the_bench_presses_the_ball_where_the_ring_is(technician, bench, compute
     assert (scene.x_mm, scene.y_mm) == pytest.approx(ring_mm, abs=0.2)
     technician.wizard.model.update_page(finished=True)
     assert not step.places_px()[1], "a complete step asks for no press"
+    technician.rest()
+
+
+def test_the_bench_takes_an_object_that_is_not_pressed_yet(
+    technician, context, bench, computed_project, small_session, tmp_path
+):
+    project = computed_project()
+    shutil.rmtree(project.session.folder / "presses")
+    technician.begin(project, "validation")
+    step, section = technician.wizard.open, technician.wizard.bench
+    placed = []
+    for press in sorted((small_session / "presses").glob("c*.png"))[:3]:
+        section.lay(step)
+        placed.append(bench.scene)
+        section.lay(step)
+        assert bench.scene == placed[-1], "it is not pressed yet"
+        (file,) = add_presses(project.session.folder / "presses", step.form.value, 1)
+        shutil.copy(press, project.session.folder / "presses" / file)
+        step._follow()
+    assert len(set(placed)) == 3
+    technician.wizard.model.jobs.cancel()
     technician.rest()

@@ -15,6 +15,7 @@ from technician import Technician, read_rgb
 from app.calibrate import validation_step as validating
 from app.calibrate.result_step import write_session_report
 from app.cli.main import main
+from app.program.calibration_status import show_in_use
 from gelpolight_core.base.compared_quantity import Quantity
 from gelpolight_core.base.finding import doubtful_finding
 from gelpolight_core.calibration.annotations import write_validation
@@ -123,7 +124,8 @@ def test_listed_presses_are_asked_for_one_by_one_continued_later_and_evaluated(
     step.table.rows.choose(step._presses[2].file)
     technician.click("validation.leave_out")
     assert step.keep.isEnabled()
-    assert technician.state("validation") == "begun" and step.number().value > 0.0
+    assert technician.state("validation") == "unrecorded" and step.number().value > 0.0
+    assert step.verdict.text().startswith("Conforms by 2 presses of 1 object")
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
     assert not step.keep.isEnabled(), "this one is recorded"
@@ -210,7 +212,10 @@ def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
     context.requests.calibrations_changed.emit()
     assert context.workspace.in_use == path
     technician.wizard.go_to("validation")
-    assert technician.see("calibrate.sentence").text() == "Validated: 0 %. In use."
+    sentence = technician.see("calibrate.sentence").text()
+    assert sentence == "Validated by 1 press of 1 object. Largest error 0 %. In use."
+    show_in_use(context)
+    assert "1 press of 1 object" in context.status.value.calibration_advice
     assert context.status.value.task == "", "the state bar shows the calibration in use"
     assert [button.text() for button in panel.buttons] == ["&Inspect", "M&easure", "&Report…"]
     context.workspace.use(None)

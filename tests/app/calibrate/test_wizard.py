@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from technician import read_rgb
 
 from app.calibrate import image_step
@@ -375,3 +375,39 @@ def test_a_saved_calibration_is_validated_with_an_image_file_while_stages_are_re
         wizard.model.jobs.cancel()
         hold.set()
         technician.rest()
+
+
+@pytest.mark.parametrize("width", [1024, 1600])
+def test_buttons_over_the_image_never_cover_its_tools(technician, computed_project, width):
+    technician.page.resize(width, 640)
+    technician.begin(computed_project(), "lens")
+    area = technician.wizard.area
+    technician.wizard.show_capture(technician.wizard.model.page.captures[0].path.name)
+    tools = QRect(area.view.bar.mapTo(area, QPoint()), area.view.bar.size())
+    assert area.back_to_live.isVisible()
+    assert not area.back_to_live.geometry().intersects(tools)
+    assert area.stack.geometry().contains(area.back_to_live.geometry())
+    technician.rest()
+
+
+def test_an_access_key_captures_at_once(technician, camera, fresh, monkeypatch):
+    technician.begin(fresh, "lens")
+    captured = []
+    monkeypatch.setattr(technician.wizard.open, "capture", lambda: captured.append(True))
+    technician.wizard.panel.capture.setEnabled(True)
+    technician.wizard.panel.capture.animateClick()  # as Qt does for an access key
+    assert captured, "not 0.1 s later, when the object may be another one"
+    technician.rest()
+
+
+def test_running_work_takes_its_space_from_the_part_that_scrolls(technician, computed_project):
+    technician.begin(computed_project(), "validation")
+    panel, model = technician.wizard.panel, technician.wizard.model
+    technician.until(lambda: not panel.progress.isVisible())
+    buttons = panel.capture, panel.lay, technician.wizard.at("validation").keep
+    places = [button.mapTo(panel, QPoint()).y() for button in buttons]
+    height = panel._scroll.height()
+    model.update_page(work=("Computing", 0.5), live=("Hold it still.", "pass"))
+    technician.until(lambda: panel._scroll.height() < height)
+    assert [button.mapTo(panel, QPoint()).y() for button in buttons] == places
+    technician.rest()

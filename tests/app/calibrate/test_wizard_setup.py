@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from app.calibrate import setup_step
 from app.calibrate.setup_values import new_session, session_of, values_of
 from app.widgets.forms import Form
 from gelpolight_core.calibration.recipes import recipe_of
@@ -40,6 +41,43 @@ def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     assert technician.page.wizard is None
     assert "set-up changes were not applied" in caplog.text
     assert read_session(folder) == before
+
+
+def test_values_are_offered_to_be_applied_only_when_changed_and_a_warning_is_shown_once(
+    technician, context, computed_project
+):
+    technician.begin(computed_project(), "setup")
+    step, model = technician.wizard.at("setup"), technician.wizard.model
+    form = step.form
+    assert not form.accept.isEnabled() and not form.accept.property("primary")
+    assert technician.wizard.panel.next.property("primary") == model.page.finished
+    form.values.inputs["ball_mm"].setValue(2.0 * step.session.sensor.working_diameter_mm)
+    assert form.accept.isEnabled() and form.accept.property("primary")
+    assert not technician.wizard.panel.next.property("primary")
+    form.serial.setText("A-009")
+    technician.click("setup.accept")
+    assert not form.accept.isEnabled()
+    (unusual,) = setup_step.unusual_numbers(step.session)
+    assert unusual.sentence in form.problem.text()
+    assert unusual.sentence not in model.page.sentence
+    model.jobs.cancel()
+    technician.rest()
+    context.source.choose_virtual_sensor()
+    assert context.source.virtual.design.serial in form.camera.text()
+    assert "A-009" in form.camera.text(), "it is the camera of another sensor"
+    assert form.camera.property("meaning") == "warn"
+
+
+def test_a_new_form_is_no_mistake_before_something_is_typed(technician):
+    technician.page.begin()
+    technician.click("question.open")
+    form = technician.page.form
+    assert form.problem.text() and form.problem.property("meaning") == "muted"
+    assert not form.accept.isEnabled()
+    form.values.inputs["led_height_mm"].setValue(20.0)
+    assert form.problem.property("meaning") == "fail"
+    form.serial.setText("B-003")
+    assert form.accept.isEnabled() and form.accept.property("primary")
 
 
 @pytest.mark.function("Enter the sensor's data, and find them again after a restart")
