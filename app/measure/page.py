@@ -49,7 +49,7 @@ class IndentersDialog(Dialog):
     ) -> None:
         kinds = Kinds.Save | Kinds.Cancel
         super().__init__(parent, "measure.indenters", "Known objects", kinds, once=True)
-        self.resize(560, 360)
+        self.resize(680, 400)
         self.indenters = indenters
         self._typed = list(indenters)
         self.names = set_names(QListWidget(), "measure.indenters.names", "Known objects")

@@ -107,7 +107,7 @@ def _section(
 def _facts(image: MeasuredPress) -> Facts:
     measurement, truth = image.measurement, image.truth or ReferenceObject(image.measurement.shape)
     reference = (
-        ("Measured", f"{image.time.astimezone():%Y-%m-%d %H:%M:%S}"),
+        ("Measured", image.time.astimezone().isoformat(" ", "seconds")),
         ("Centre (x, y)", "{:.3f}, {:.3f} mm".format(*measurement.centre_mm)),
         ("Edge radius", number_text(measurement.edge_radius_mm, ".3f", " mm")),
         ("Decay length of the membrane", f"{measurement.drape_decay_mm:.3f} mm"),
