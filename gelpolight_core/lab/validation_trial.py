@@ -90,7 +90,7 @@ def recorded_validation(
                 comparisons.append(replace(q, name=q.label, limit_percent=limit))
     if comparisons:
         return _validation(calibration.identity, objects, comparisons)
-    return "; ".join(f"{fault}: {count}" for fault, count in refused.items())
+    return ", ".join(f"{count} {fault}" for fault, count in refused.items())
 
 
 def _why_not_counted(record: MeasurementRecord, calibration: CalibrationSummary) -> str:
@@ -98,13 +98,12 @@ def _why_not_counted(record: MeasurementRecord, calibration: CalibrationSummary)
     if record.calibration_id != calibration.identity:
         return "measured with another calibration"
     if record.shape not in SHAPES or all(q.truth is None for q in record.quantities):
-        return "not an object of stated size"
+        return "not of an object of stated size"
     if record.verdict == DOUBTFUL:
         return "doubtful"
     if not file.is_file():
-        return "its image is not a file"
-    used = file_hash(file) in calibration.sources
-    return "the calibration was made from its image" if used else ""
+        return "without an image file"
+    return "with an image of the calibration" * (file_hash(file) in calibration.sources)
 
 
 def _validation(

@@ -301,7 +301,7 @@ def test_saved_measurements_validate_a_calibration_without_its_session(
     )  # fmt: skip
     context.workspace.records.add(replace(record, verdict="doubtful"))
     page.offered["validate"].trigger()
-    assert "doubtful: 1" in words(page)
+    assert "1 doubtful" in words(page)
     answer(page, "answer0")
     context.workspace.records.add(record)
     page.offered["validate"].trigger()
