@@ -223,9 +223,8 @@ class BallsStep(ImageStep):
         detect = partial(detect_open_ball, radius_mm=self.radius_mm)
         if name:
             detect = partial(detect, setting=setting, editable=True)
-            return self.of_capture(
-                name, detect, ImageOverlay(lines=(working_circle(setting.table),))
-            )
+            border = ImageOverlay(lines=(working_circle(setting.table),))
+            return self.of_capture(name, detect, border)
         marks = press_marks(*self.places_px())
         return partial(detect, setting=setting.coarser(), marks=marks, live=True)
 

@@ -226,9 +226,8 @@ def ball_handle(indentation: Indentation, table: ResamplingTable) -> OverlayCirc
     if len(centre_px) == 0 or len(edge_px) == 0:
         return None
     radius_px = float(np.mean(np.linalg.norm(edge_px - centre_px[0], axis=1)))
-    return OverlayCircle(
-        float(centre_px[0, 0]), float(centre_px[0, 1]), radius_px, "good", handle="ball"
-    )
+    u, v = map(float, centre_px[0])
+    return OverlayCircle(u, v, radius_px, "good", handle="ball")
 
 
 def table_of(results: StageResults) -> ResamplingTable | None:

@@ -197,9 +197,8 @@ class _ThumbnailDelegate(QStyledItemDelegate):
         painter.setPen(QPen(colour, 3.0 if is_selected else 1.5))
         painter.drawRoundedRect(frame, 4.0, 4.0)
         metrics = option.fontMetrics
-        caption = metrics.elidedText(
-            capture.caption, Qt.TextElideMode.ElideRight, THUMB.width() - 28
-        )
+        width = THUMB.width() - 28
+        caption = metrics.elidedText(capture.caption, Qt.TextElideMode.ElideRight, width)
         plate = QRect(0, 0, metrics.horizontalAdvance(caption) + 10, metrics.height() + 2)
         plate.moveBottomRight(frame.bottomRight() - QPoint(3, 3))
         painter.setPen(Qt.PenStyle.NoPen)
@@ -340,16 +339,14 @@ class CaptureVerdictCard(QFrame):
 
     def __init__(self, view: QWidget) -> None:
         super().__init__(view)
-        set_names(self, "card", "Verdict on the new capture")
+        text = "Verdict on the new capture"
+        set_names(self, "card", text)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._view, self._sign = view, StatusIcon()
-        self.title = named_label(
-            "calibrate.verdict", "Verdict on the new capture", wrap=False, bold=1.0
-        )
+        self.title = named_label("calibrate.verdict", text, wrap=False, bold=1.0)
         self._why = PlainLabel(wrap=True)
-        vbox(
-            hbox(self._sign, (self.title, 1), margins=0), self._why, of=self, margins=12, spacing=4
-        )
+        head = hbox(self._sign, (self.title, 1), margins=0)
+        vbox(head, self._why, of=self, margins=12, spacing=4)
         self.setFixedWidth(VERDICT_WIDTH)
         self._end = timer(self, VERDICT_MS, self.hide, once=True)
         self.hide()

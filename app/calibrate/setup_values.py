@@ -348,9 +348,8 @@ def preset_text(values: SetupValues) -> str:
         sentence += (
             f", with {100.0 * max(preset.cropped):.0f} % of the camera image cut off on each side"
         )
-    area = (
-        f"The visible membrane is {preset.working_area_mm[0]:g} x {preset.working_area_mm[1]:g} mm."
-    )
+    width_mm, height_mm = preset.working_area_mm
+    area = f"The visible membrane is {width_mm:g} x {height_mm:g} mm."
     markers = ""
     if any(preset.marker_pitches_mm):
         markers = " Printed markers are found and left out."

@@ -119,9 +119,8 @@ class BenchSection(QWidget):
             scene = bench.scene
             self._grab_offset = scene.x_mm - position[0], scene.y_mm - position[1]
         elif self._grab_offset is not None:
-            bench.set_scene(
-                x_mm=position[0] + self._grab_offset[0], y_mm=position[1] + self._grab_offset[1]
-            )
+            dx_mm, dy_mm = self._grab_offset
+            bench.set_scene(x_mm=position[0] + dx_mm, y_mm=position[1] + dy_mm)
             if phase == "end":
                 self._grab_offset = None
 

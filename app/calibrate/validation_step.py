@@ -308,9 +308,7 @@ class ValidationStep(Step):
         listed: tuple[ReferencePress, ...] = ()
         with self._errors():
             listed = listed_presses(self._folder)
-        self._presses = tuple(
-            replace(press, outcome=self._outcomes.get(press.file, "")) for press in listed
-        )
+        self._presses = tuple(replace(p, outcome=self._outcomes.get(p.file, "")) for p in listed)
         if self.model.page.step is self:
             self.model.changed.emit()
             self._measure_next()

@@ -213,9 +213,8 @@ class Wizard(QWidget):
         page = self.model.page
         # The messages belong to the step before; they are removed, even during a computation.
         page_state = PageState(self.steps, self.open, page.states)
-        self.model.show_page(
-            replace(page_state, camera=page.camera, lost=page.lost, work=page.work)
-        )
+        shown = replace(page_state, camera=page.camera, lost=page.lost, work=page.work)
+        self.model.show_page(shown)
         self._keys["capture_now"].setEnabled(self.open.frames > 0)
         self.live.use(self.open.frames > 0)
         self.open.enter()
@@ -230,9 +229,8 @@ class Wizard(QWidget):
         if self.live.page_shown:
             task = f"Calibrating: {page.place + 1} of {len(self.steps)}"
             is_end = page.finished and not page.following
-            self.context.status.update(
-                sensor=self.project.session.serial, task="" if is_end else task
-            )
+            serial = self.project.session.serial
+            self.context.status.update(sensor=serial, task="" if is_end else task)
 
     def _next(self) -> None:
         """Show the next step, or say what is missing in this one."""

@@ -247,9 +247,8 @@ class WizardModel(QObject):
             return True
 
         first = iter((is_done,))
-        self.undo.push(
-            UndoStep(text, lambda: next(first, False) or run(value), partial(run, before))
-        )
+        step = UndoStep(text, lambda: next(first, False) or run(value), partial(run, before))
+        self.undo.push(step)
 
     # Background work
 

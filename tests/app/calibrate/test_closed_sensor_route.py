@@ -176,7 +176,7 @@ def test_the_scale_is_measured_on_a_pressed_pin_grid(technician, small_session, 
     assert measured.mm_per_px == pytest.approx([3.0 / PINS_PX] * 2, rel=0.01)
     name = project.session.found("scale")[0].name
     technician.wizard.show_capture(name)
-    said = technician.see("calibrate.live")
+    said = technician.wizard.panel.live
     technician.until(lambda: f"{measured.pins} pins" in said.text())
     assert "balls" in project.stale()
     technician.wizard.model.undo.undo()
