@@ -348,7 +348,7 @@ class ResultStep(Step):
         is_ready = is_idle and all(map(_is_made, statuses.values()))
         self._draw_result(self.results.get(self.project.recipe.stages[-1]) if is_ready else None)
         self.save.setText("&Save as a draft" if role == "fail" else "&Save the calibration")
-        self.save.setEnabled(is_ready and not model.saved)
+        self.save.setEnabled(is_ready and not model.saved and not model.jobs.busy)
         self.save.setToolTip("It is saved, and nothing has changed since." if model.saved else "")
         set_property(self.save, "primary", self.save.isEnabled())
         # The report waits for the stages by itself.
@@ -455,6 +455,7 @@ class ResultStep(Step):
             self.model.use_calibration(path)
 
         self.model.jobs.submit(BackgroundJob("Saving the calibration", work, done))
+        self.refresh()
 
 
 def ask_report(step: Step) -> None:

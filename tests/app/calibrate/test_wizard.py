@@ -274,6 +274,7 @@ def test_a_failed_calibration_is_saved_as_a_draft_and_the_one_in_use_stays(
     top = results[TOP_POSE]
     failed_top = replace(top, pose=replace(top.pose, quality=failed))
     project._results = results.having(TOP_POSE, failed_top)
+    technician.wizard.model.saved_path = None  # the failed result is not saved
     technician.wizard.refresh()
     assert step.overview.headline.property("meaning") == "fail"
     assert technician.state("result") == "fail"
