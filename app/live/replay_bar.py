@@ -89,12 +89,11 @@ class ReplayBar(QWidget):
         if self._source is None:
             return
         now = self._source.playback()
-        with QSignalBlocker(self._slider):
+        slider, loop, speed = map(QSignalBlocker, (self._slider, self._loop, self._speed))
+        with slider, loop, speed:
             self._slider.setRange(0, max(now.count - 1, 0))
             self._slider.setValue(now.position)
-        with QSignalBlocker(self._loop):
             self._loop.setChecked(now.loop)
-        with QSignalBlocker(self._speed):
             self._speed.setCurrentIndex(self._speed.findData(now.speed))
         self._play.setChecked(now.playing)
         self._words.setText(playback_text(now))
@@ -131,6 +130,4 @@ def playback_text(now: Playback) -> str:
     if now.file:
         return f"{now.file},  image {now.position + 1} of {now.count}"
     text = f"{now.time_s:.2f} / {now.duration_s:.2f} s,  frame {now.position + 1} of {now.count}"
-    if now.damaged:
-        text += f",  {now.damaged} damaged"
-    return text
+    return f"{text},  {now.damaged} damaged" if now.damaged else text

@@ -65,7 +65,7 @@ def put_into_use(path: Path | None, parent: QWidget, *, context: AppContext) -> 
             done = True
         context.requests.calibrations_changed.emit()
         if done and entry is not None and entry.state[1] == "warn":
-            context.toasts.show(NOT_VALIDATED, "warn")
+            context.toasts.show("This calibration is not validated.", "warn")
 
     def accept() -> None:
         from gelpolight_core.calibration.annotations import write_reason  # slow import

@@ -54,8 +54,9 @@ QUIET: dict[str, Any] = {"reset_camera": False, "render": False}
 PLAIN = {**QUIET, "lighting": False}
 PLATE = 0.7
 """Opacity of the plates behind letters."""
-BAR = 0.135
-"""Share of the view, from the left, in which the colour bar lies: the axes begin beside it."""
+BAR, BAR_HEIGHT = 0.135, 0.38
+"""Share of the view, from the left, in which the colour bar lies: the axes begin beside it; and the
+share of its height."""
 LIFT = 0.001
 """Lines lie above the surface by this share of its width, so that it does not cover them."""
 
@@ -252,16 +253,13 @@ def draw_scale(
     colours = np.array([colour for _, colour in scale.names]) if scale.names else scale.table
     low, high = (0.0, float(len(colours))) if scale.names else (scale.low, scale.high)
     mapper = actor.mapper
-    mapper.lookup_table = pv.LookupTable(
-        values=np.insert(colours, 3, 255, axis=1), scalar_range=(low, high)
-    )
-    mapper.lookup_table.annotations = {
-        number + 0.5: name for number, (name, _) in enumerate(scale.names)
-    }
+    table = np.insert(colours, 3, 255, axis=1)
+    mapper.lookup_table = pv.LookupTable(values=table, scalar_range=(low, high))
+    mapper.lookup_table.annotations = {k + 0.5: name for k, (name, _) in enumerate(scale.names)}
     mapper.scalar_visibility = False  # the texture contains the colours
     title = scale.title.replace(" (", "\n(")  # the unit on a line of its own, for narrow views
     numbers = {"n_labels": 0 if scale.names else 5, "fmt": "{:.4g}"}
-    place = {"position_x": 0.015, "position_y": 0.56, "width": BAR - 0.015, "height": 0.38}
+    place = {"position_x": 0.015, "position_y": 0.56, "width": BAR - 0.015, "height": BAR_HEIGHT}
     sizes = {"title_font_size": ink.font + 1, "label_font_size": ink.font + 1}
     how = {"vertical": True, "color": ink.text, "unconstrained_font_size": True, "render": False}
     bar = plotter.add_scalar_bar(title, mapper=mapper, **numbers, **place, **sizes, **how)

@@ -52,7 +52,8 @@ class SurfacePanel(QWidget):
     report : callable
         Called with the result of saving: a sentence and its kind.
     flat : callable
-        Makes the shaded map: a widget with `set_image`, `show_message`, `show_cursor` and the signal `pointed`.
+        Makes the shaded map: a widget with `set_image`, `show_message`, `show_cursor` and the
+        signal `pointed`.
 
     Attributes
     ----------

@@ -19,6 +19,7 @@ from gelpolight_core.base.arrays import Float64Array, PointXY, Rgb8Array
 from .display_surface import LIVE_NODES, DisplaySurface, SurfaceLine
 from .overlays import (
     BAR,
+    BAR_HEIGHT,
     CURSOR,
     CUT,
     VIEWS,
@@ -145,7 +146,10 @@ class Scene:
         draw_scale_bar(self._plotter, self.box, style, self._ink)
 
     def lay_axes(self) -> None:
-        """Place the axes and their numbers for the present camera, before it is drawn."""
+        """Place axes and numbers for the present camera and window, before they are drawn."""
+        lines = BAR_HEIGHT * self._size[1] / self._letter_px
+        for bar in self._plotter.scalar_bars.values():
+            bar.SetNumberOfLabels(bar.GetNumberOfLabels() and (5 if lines > 6.0 else 3))
         marks = self._marks()
         laid = self._ink, marks and (marks[0].tobytes(), marks[2])
         if laid != self._laid:
@@ -155,8 +159,7 @@ class Scene:
     def _marks(self) -> AxesMarks | None:
         if self.surface is None or not (self.box and self.style.axes):
             return None
-        letter_px = (self._ink.font + 1) * self._plotter.render_window.GetDPI() / 72.0
-        letters, (value, title) = 0.5 * self._size / letter_px, self.surface.axis
+        letters, (value, title) = 0.5 * self._size / self._letter_px, self.surface.axis
         how = value / self.style.exaggeration, title
         return axes_marks(self.box, *how, lambda points: letters * self._project(points))
 
@@ -243,6 +246,10 @@ class Scene:
     @property
     def _size(self) -> Float64Array:
         return np.maximum(np.asarray(self._plotter.window_size, np.float64), 1.0)  # 0 if unshown
+
+    @property
+    def _letter_px(self) -> float:
+        return float((self._ink.font + 1) * self._plotter.render_window.GetDPI() / 72.0)
 
     def _project(self, points: Float64Array) -> Float64Array:
         """Return where points (N, 3) of the scene are in the window, -1 to 1."""
