@@ -3,6 +3,7 @@
 import gc
 import itertools
 import weakref
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from app.views.map.colour_tables import colour_table
 from app.views.surface.display_surface import SurfaceLine, surface_of
 from app.views.surface.overlays import BAR, FONT, VIEWS
 from app.views.surface.panel import SurfacePanel
+from app.views.surface.scene import OffscreenScene
 from app.widgets.layout import hbox
 from gelpolight_core.geometry.membrane_shape import MembraneShape
 from tests.app.views.surface.conftest import BUMP, SMALL, WAIT_MS, flat_map, pixels
@@ -371,3 +373,11 @@ def test_without_opengl_the_relief_is_shown_and_the_reason(settings, made, qtbot
     assert panel.view is None and "OpenGL 3.2" in panel.reason
     assert panel._flat is not None and panel._flat.isVisible()
     jobs.close()
+
+
+def test_the_colour_bar_has_as_many_numbers_as_have_room(panel):
+    for height, count in ((560, 5), (170, 3)):
+        with closing(OffscreenScene(panel.view.scene, (640, height))) as studio:  # type: ignore[union-attr]
+            studio.draw()
+            (bar,) = studio._plotter.scalar_bars.values()
+            assert bar.GetNumberOfLabels() == count
