@@ -122,13 +122,12 @@ class Measurement:
     @property
     def figures(self) -> tuple[MeasuredValue, ...]:
         """Its sizes, height, place and surroundings."""
-        sizes: tuple[MeasuredValue, ...]
-        if self.side_mm is None:
-            assert self.diameter_mm is not None
-            sizes = (MeasuredValue(self.diameter_mm, self.sd["diameter_mm"], "mm", "diameter"),)
-        else:
+        if self.side_mm is not None:
             named = zip(self.side_mm, self.sd["side_mm"], ("side_a", "side_b"), strict=True)
             sizes = tuple(MeasuredValue(side, sd, "mm", name) for side, sd, name in named)
+        else:
+            assert self.diameter_mm is not None
+            sizes = (MeasuredValue(self.diameter_mm, self.sd["diameter_mm"], "mm", "diameter"),)
         turned: tuple[MeasuredValue, ...] = ()
         if self.yaw_deg is not None:
             turned = (MeasuredValue(self.yaw_deg, self.sd["yaw_deg"], "deg", "yaw"),)
