@@ -218,7 +218,9 @@ def _uncertainty(c: Calibration, shape: str) -> ResultPicture:
     if decides.size:
         reach = f"{decides[0]:.2g} to {decides[-1]:.2g} mm deep"
         caption = f"Heights can be judged by a tolerance of {tolerance:g} % from {reach}"
-    caption += f"; diameters are known within {across.max():.2g} %."
+    caption += (
+        f"; diameters are known within {across.max():.2g} %. A poor fit of an object adds to it."
+    )
     marks: list[Mark] = [Level(tolerance, f"tolerance {tolerance:g} %")]
     # The names are above all curves, which do not strike them through.
     line = TEXT_SHARE * max(height.max(), across.max(), tolerance)
