@@ -336,7 +336,7 @@ class ResultStep(Step):
     def refresh(self) -> None:
         """Show the present state of every stage."""
         model, statuses = self.model, self.model.statuses
-        self.saved.setText(f"Saved as {model.saved}." if model.saved else "")
+        self.saved.setText(model.saved_line)
         _, tables = cause_and_rest({key: status.quality for key, status in statuses.items()})
         mend = self._mend()
         cause = "" if mend is None else mend.text
@@ -436,25 +436,15 @@ class ResultStep(Step):
     # Saving
 
     def store(self) -> None:
-        """Write the calibration into the library, and use it from now on unless it failed."""
+        """Write the calibration into the library."""
         project, workspace = self.project, self.context.workspace
 
-        def work(_progress: object) -> tuple[Path, Finding | None]:
+        def work(_progress: object) -> Path:
             calibration = project.finish().calibration
             name = f"{calibration.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
-            path = workspace.keep_calibration(calibration, name)
-            if not calibration.fault:
-                workspace.use(path)
-            return path, calibration.fault
+            return workspace.keep_calibration(calibration, name)
 
-        def done(saved: tuple[Path, Finding | None]) -> None:
-            path, fault = saved
-            text = f"Saved as a draft, {path.stem}, and not in use."
-            self.model.show_notice(text if fault else "", "fail")
-            self.context.requests.calibrations_changed.emit()
-            self.model.use_calibration(path)
-
-        self.model.jobs.submit(BackgroundJob("Saving the calibration", work, done))
+        self.model.jobs.submit(BackgroundJob("Saving the calibration", work, self.model.keep))
         self.refresh()
 
 

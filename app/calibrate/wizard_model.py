@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QWidget
 from app.live.live_detection import LiveDetection
 from app.live.live_session import LiveSession
 from app.program.calibration_entries import read_entry
+from app.program.calibration_status import put_into_use
 from app.program.context import AppContext
 from app.program.jobs import BackgroundJob, JobQueue
 from app.widgets.actions import UndoStep
@@ -80,7 +81,7 @@ class WizardModel(QObject):
         self, project: CalibrationProject, *, context: AppContext, window: QWidget
     ) -> None:
         super().__init__(window)
-        self.project, self.context = project, context
+        self.project, self.context, self._window = project, context, window
         self.undo = QUndoStack(self)
         self.live = LiveSession(context=context, name="detection", keeps_seen=True, parent=self)
         self.live.use(False)  # until a step needs images
@@ -141,6 +142,27 @@ class WizardModel(QObject):
         self.saved_path, summary = path, read_entry(path).summary
         self._saved_inputs = "" if summary is None else summary.inputs
         self.changed.emit()
+
+    @property
+    def saved_line(self) -> str:
+        """Where the present captures are saved, and whether that is in use. Empty: not saved."""
+        in_use = self.context.workspace.in_use == self.saved_path
+        return self.saved and f"Saved as {self.saved}, and {'in use' if in_use else 'not in use'}."
+
+    def keep(self, path: Path) -> None:
+        """Show a new calibration, and use it unless it failed. A button returns to the former."""
+        context, before = self.context, self.context.workspace.in_use
+        failed = read_entry(path).failed
+        if not failed:
+            with context.toasts.errors():
+                context.workspace.use(path)
+        self.use_calibration(path)
+        context.requests.calibrations_changed.emit()
+        draft = f"Saved as a draft, {path.stem}, and not in use."
+        self.show_notice(draft if failed else "", "fail")
+        if before is not None and not failed:
+            undo = partial(put_into_use, before, self._window, context=context)
+            context.toasts.show(self.saved_line, actions=(("Use the previous one", undo),))
 
     # Images
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtWidgets import QPushButton
 from technician import read_rgb
 
 from app.calibrate import image_step
@@ -411,4 +412,24 @@ def test_running_work_takes_its_space_from_the_part_that_scrolls(technician, com
     model.update_page(work=("Computing", 0.5), live=("Hold it still.", "pass"))
     technician.until(lambda: panel._scroll.height() < height)
     assert [button.mapTo(panel, QPoint()).y() for button in buttons] == places
+    technician.rest()
+
+
+@pytest.mark.function("Save a calibration, see what is in use, and go back to the previous one")
+def test_saving_says_what_is_in_use_and_offers_the_previous_calibration(
+    technician, context, computed_project
+):
+    context.toasts.attach(technician.page, list)
+    technician.begin(computed_project(), "result")
+    model = technician.wizard.model
+    technician.save()
+    first = context.workspace.in_use
+    assert first == model.saved_path and "in use" in technician.see("result.saved").text()
+    assert not context.toasts.shown(), "there is no previous one"
+    saved = Path(shutil.copy(first, first.with_name("new.gplcal")))
+    model.keep(saved)
+    assert context.workspace.in_use == saved and model.saved_line.endswith(", and in use.")
+    (button,) = context.toasts.shown()[-1].findChildren(QPushButton)
+    button.click()
+    assert context.workspace.in_use == first and model.saved_line.endswith("not in use.")
     technician.rest()
