@@ -17,7 +17,7 @@ from app.program.jobs import BackgroundJob
 from app.program.workspace import Workspace
 from app.views.map.colour_tables import colour_table
 from app.widgets.actions import push_button
-from app.widgets.label import MarkupLabel, escaped
+from app.widgets.label import MarkupLabel, escaped, plain_tip
 from app.widgets.layout import hbox, scroll_area, vbox
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.text_roles import named_label, set_property, set_text_role
@@ -349,7 +349,8 @@ class ResultStep(Step):
         self._draw_result(self.results.get(self.project.recipe.stages[-1]) if is_ready else None)
         self.save.setText("&Save as a draft" if role == "fail" else "&Save the calibration")
         self.save.setEnabled(is_ready and not model.saved and not model.jobs.busy)
-        self.save.setToolTip("It is saved, and nothing has changed since." if model.saved else "")
+        tip = "It is saved, and nothing has changed since." if model.saved else ""
+        self.save.setToolTip(plain_tip(tip))
         set_property(self.save, "primary", self.save.isEnabled())
         # The report waits for the stages by itself.
         self.report.setEnabled(is_ready or bool(model.jobs.busy and model.saved))
