@@ -39,7 +39,7 @@ from gelpolight_core.calibration.open_sensor_recipe import TOP_POSE
 from gelpolight_core.calibration.recipe import StageResults
 from gelpolight_core.calibration.recipes import OPEN_FOLDERS
 from gelpolight_core.calibration.stage_status import StageState, StageStatus
-from gelpolight_core.sensor.sensor_calibration import Calibration, OpenSensor
+from gelpolight_core.sensor.sensor_calibration import Calibration
 
 from .image_panels import MapsView, most_oblique_press
 from .image_step import ImageStep
@@ -148,7 +148,7 @@ def last_calibration(c: Calibration, workspace: Workspace) -> str:
     for summary, made, path in ((e.summary, e.created, e.path) for e in entries):
         if summary is not None and made is not None and summary.inputs != c.provenance.inputs:
             changes = ", ".join(changes_since(read_calibration(path), c))
-            return f"Last calibration, {made.astimezone():%-d %b}: {changes}."
+            return f"Last calibration, {made.astimezone():%d %b}: {changes}."
     return ""
 
 
@@ -156,8 +156,8 @@ def changes_since(last: Calibration, c: Calibration) -> Iterator[str]:
     """Yield the error of the last calibration, and how far LEDs and light of the membrane are."""
     if (figure := main_figure(last.quality.values())) is not None:
         yield figure.value_text
-    if isinstance(last.data, OpenSensor) and isinstance(c.data, OpenSensor):
-        before_mm, now_mm = ((d.full or d).led_positions_mm for d in (last.data, c.data))
+    before_mm, now_mm = last.data.leds_mm, c.data.leds_mm
+    if now_mm.size and before_mm.shape == now_mm.shape:
         yield f"LEDs within {np.linalg.norm(now_mm - before_mm, axis=1).max():.3f} mm"
     before, now = (float(np.nanmedian(x.data.background)) for x in (last, c))
     yield f"light {100.0 * (now / before - 1.0):+.1f} %"

@@ -301,9 +301,9 @@ class SensorsPage(QWidget):
         measure = "&Measure", partial(self._measure, entry)
         with context.toasts.errors():
             limits = context.settings.limits.percent
-            trial = recorded_validation(context.workspace.records, summary, limits)
-            if isinstance(trial, str):
-                why = f" ({trial})" if trial else ""
+            trial, why = recorded_validation(context.workspace.records, summary, limits)
+            if trial is None:
+                why = f" ({why})" if why else ""
                 ask(self, "Validate", MEASURE_FIRST.format(why=why), measure)
             else:
                 record = "&Record this validation", partial(self._record, trial, entry.path)

@@ -55,12 +55,12 @@ def validate(
 
 def recorded_validation(
     store: Store, calibration: CalibrationSummary, limits_percent: tuple[float, float]
-) -> Validation | str:
-    """Return the validation of a calibration from its saved measurements, or why none counts.
+) -> tuple[Validation | None, str]:
+    """Return the validation of a calibration from its saved measurements, and what does not count.
 
     A measurement counts if it is of an object of stated size, is not doubtful, and its image is
-    a file that the calibration was not made from. Whether it conforms makes no difference. Why
-    none counts is empty if none of this sensor was saved.
+    a file that the calibration was not made from. Whether it conforms makes no difference. How
+    many do not count, and why, is empty if all of this sensor do.
 
     Parameters
     ----------
@@ -88,9 +88,8 @@ def recorded_validation(
             for q in compared:
                 limit = limits_percent[q.label == "height"]
                 comparisons.append(replace(q, name=q.label, limit_percent=limit))
-    if comparisons:
-        return _validation(calibration.identity, objects, comparisons)
-    return ", ".join(f"{count} {fault}" for fault, count in refused.items())
+    why = ", ".join(f"{count} {fault}" for fault, count in refused.items())
+    return _validation(calibration.identity, objects, comparisons) if comparisons else None, why
 
 
 def _why_not_counted(record: MeasurementRecord, calibration: CalibrationSummary) -> str:

@@ -240,6 +240,10 @@ class SensorModel(BackgroundReference, Protocol):
     def length_errors(self) -> LengthErrors | None:
         """Errors of lengths; None if the calibration does not state them."""
 
+    @property
+    def leds_mm(self) -> Float64Array:
+        """Positions (N, 3) of the LEDs as calibrated at last, none if they are not known."""
+
 
 @dataclass(frozen=True)
 class OpenSensor:
@@ -332,6 +336,11 @@ class OpenSensor:
             math.hypot(scale.lateral, stated.lateral),
         )
         return LengthErrors(depth, lateral, self.table.grid.pitch_mm, self.full.decay_mm)
+
+    @property
+    def leds_mm(self) -> Float64Array:
+        """Positions (3, 3) of the LEDs: refined, or of the mirror."""
+        return (self.full or self).led_positions_mm
 
     @cached_property
     def table(self) -> ResamplingTable:

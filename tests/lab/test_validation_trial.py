@@ -46,14 +46,14 @@ def test_only_trusted_measurements_of_other_images_count_whether_they_conform_or
     for shape, quantity, verdict, file, identity in cases:
         settings = {FILE: str(file)} if file else {}
         store.add(MeasurementRecord("A", identity, shape, (quantity,), verdict, settings=settings))
-    why = recorded_validation(store, calibration, (5.0, 8.0))
+    _, why = recorded_validation(store, calibration, (5.0, 8.0))
     counts = [int(part.split()[0]) for part in why.split(", ")]
     assert sum(counts) == len(cases) and len(counts) == 5, "each kind of reason once"
     for quantity in (stated, far):
         store.add(
             MeasurementRecord("A", "c1", "ball", (quantity,), "pass", settings={FILE: str(image)})
         )
-    validation = recorded_validation(store, calibration, (5.0, 8.0))
+    validation, _ = recorded_validation(store, calibration, (5.0, 8.0))
     assert [c.value for c in validation.comparisons] == [5.01, 6.0]
     assert {(c.name, c.limit_percent) for c in validation.comparisons} == {("diameter", 5.0)}
     assert validation.verdict is Verdict.FAIL and validation.identity == "c1"

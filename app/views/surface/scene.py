@@ -150,11 +150,12 @@ class Scene:
         lines = BAR_HEIGHT * self._size[1] / self._letter_px
         for bar in self._plotter.scalar_bars.values():
             bar.SetNumberOfLabels(bar.GetNumberOfLabels() and (5 if lines > 6.0 else 3))
-        marks = self._marks()
-        laid = self._ink, marks and (marks[0].tobytes(), marks[2])
+        camera, axis = self._plotter.camera, self.surface and self.surface.axis
+        view = camera.position, camera.focal_point, camera.up, camera.view_angle
+        laid = self._ink, self.style, self.box, axis, view, *self._size, self._letter_px
         if laid != self._laid:
             self._laid = laid
-            draw_axes(self._plotter, marks, self._ink)
+            draw_axes(self._plotter, self._marks(), self._ink)
 
     def _marks(self) -> AxesMarks | None:
         if self.surface is None or not (self.box and self.style.axes):

@@ -85,6 +85,11 @@ class ClosedSensor:
         )
 
     @property
+    def leds_mm(self) -> NDArray[np.float64]:
+        """None (0, 3): the LEDs of a closed sensor are not located."""
+        return np.empty((0, 3))
+
+    @property
     def background(self) -> NDArray[np.float32]:
         """The untouched membrane, linear light on the grid."""
         return self.in_place.background

@@ -394,7 +394,7 @@ def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     advice = page.press_view.banner.findChild(object, "inspect.advice")
     qtbot.waitUntil(lambda: "64x48" in advice.text(), timeout=PATIENCE_MS)
     assert advice.text().startswith(wrong.name)
-    assert not page.press_view.inspector.reason.text()  # it is said once
+    assert not page.press_view.inspector.reason.text()  # the banner says it
     assert page.press_view.map.hint.text() == ""
     work, message = page.press_view.work, page.press_view.inspector.message
     work.answer = "Nothing was found"
